@@ -1,0 +1,160 @@
+//! Status numbers and their texts, and the one error type every room returns.
+//!
+//! Numbers never change once published: 0 is ok, positive is progress, negative is an error.
+//! Each family owns a block of one hundred, so that a number alone names the family.
+
+/// The call did what it says; nothing more is to be expected from it.
+pub const GIB_OK: i32 = 0;
+/// The function is running: call its `_step` again in the next servo cycle.
+pub const GIB_BUSY: i32 = 1;
+/// The function has ended well and its result can be read.
+pub const GIB_DONE: i32 = 2;
+
+/// A required pointer is NULL.
+pub const GIB_ERR_NULL: i32 = -1;
+/// The memory behind the handle was never initialised, or was freed.
+pub const GIB_ERR_HANDLE: i32 = -2;
+/// A configuration value is out of range; `_last_error` names the field, the value and the bound.
+pub const GIB_ERR_CONFIG: i32 = -3;
+/// `struct_size` is shorter than the first published size, or an unknown tail is not zero.
+pub const GIB_ERR_STRUCT_SIZE: i32 = -4;
+/// The call is not legal in the present state (see the function's `[state: …]`).
+pub const GIB_ERR_STATE: i32 = -5;
+/// The caller aborted; everything changed has been restored.
+pub const GIB_ERR_ABORTED: i32 = -6;
+/// An internal fault was caught at the boundary. Please report it.
+pub const GIB_ERR_INTERNAL: i32 = -7;
+/// Memory could not be had, or the memory given is too small or misaligned.
+pub const GIB_ERR_MEMORY: i32 = -8;
+/// The caller's buffer is too small; the needed size has been written.
+pub const GIB_ERR_BUFFER: i32 = -9;
+/// An input of this cycle is NaN or infinite.
+pub const GIB_ERR_NON_FINITE: i32 = -10;
+/// The kernel reported a drive fault.
+pub const GIB_ERR_DRIVE_FAULT: i32 = -11;
+/// A parameter write was not acknowledged in time; the old values were requested again.
+pub const GIB_ERR_ACK_TIMEOUT: i32 = -12;
+/// The torque bound of the configuration was exceeded.
+pub const GIB_ERR_TORQUE_BOUND: i32 = -13;
+/// The travel bound of the configuration was exceeded.
+pub const GIB_ERR_TRAVEL_BOUND: i32 = -14;
+/// A state did not end before its deadline.
+pub const GIB_ERR_DEADLINE: i32 = -15;
+/// The restore of the old values was not acknowledged: the machine may run with changed parameters.
+pub const GIB_ERR_RESTORE_UNCONFIRMED: i32 = -16;
+/// The function is switched off.
+pub const GIB_ERR_DISABLED: i32 = -17;
+/// A file could not be read or written.
+pub const GIB_ERR_IO: i32 = -18;
+/// A file or text does not have the format it should have.
+pub const GIB_ERR_FORMAT: i32 = -19;
+/// This library cannot serve the ABI version asked for.
+pub const GIB_ERR_VERSION: i32 = -20;
+
+/// The torque never rose after the reversal: no end of the lost motion was seen.
+pub const GIB_ERR_BACKLASH_NO_RISE: i32 = -100;
+/// The table had not broken away when the detection limit was reached.
+pub const GIB_ERR_BACKLASH_LIMIT: i32 = -101;
+/// The stiffness line is lost in the torque noise: the value would mean nothing.
+pub const GIB_ERR_BACKLASH_NOISE: i32 = -102;
+/// The two directions disagree by more than their uncertainties allow.
+pub const GIB_ERR_BACKLASH_DIRECTIONS: i32 = -103;
+/// The lost motion is smaller than the encoder or the noise can resolve.
+pub const GIB_ERR_BACKLASH_RESOLUTION: i32 = -104;
+/// The torque curve has not the shape of a release, a clearance and a wind-up.
+pub const GIB_ERR_BACKLASH_SHAPE: i32 = -105;
+/// The share of friction on the motor side could not be told from the wind-up.
+pub const GIB_ERR_BACKLASH_MOTOR_FRICTION: i32 = -106;
+
+/// Every status and the sentence that explains it.
+const TEXTS: &[(i32, &str)] = &[
+    (GIB_OK, "ok\0"),
+    (GIB_BUSY, "busy: call the step again in the next servo cycle\0"),
+    (GIB_DONE, "done: the result can be read\0"),
+    (GIB_ERR_NULL, "a required pointer is NULL\0"),
+    (GIB_ERR_HANDLE, "the handle was never initialised, or was freed\0"),
+    (GIB_ERR_CONFIG, "a configuration value is out of range\0"),
+    (GIB_ERR_STRUCT_SIZE, "struct_size is too short, or an unknown tail is not zero\0"),
+    (GIB_ERR_STATE, "this call is not legal in the present state\0"),
+    (GIB_ERR_ABORTED, "aborted by the caller; everything changed was restored\0"),
+    (GIB_ERR_INTERNAL, "internal fault, caught at the boundary\0"),
+    (GIB_ERR_MEMORY, "no memory, or the memory given is too small or misaligned\0"),
+    (GIB_ERR_BUFFER, "the buffer is too small\0"),
+    (GIB_ERR_NON_FINITE, "an input of this cycle is not a finite number\0"),
+    (GIB_ERR_DRIVE_FAULT, "the kernel reported a drive fault\0"),
+    (GIB_ERR_ACK_TIMEOUT, "a parameter write was not acknowledged in time\0"),
+    (GIB_ERR_TORQUE_BOUND, "the torque bound was exceeded\0"),
+    (GIB_ERR_TRAVEL_BOUND, "the travel bound was exceeded\0"),
+    (GIB_ERR_DEADLINE, "a state did not end before its deadline\0"),
+    (GIB_ERR_RESTORE_UNCONFIRMED, "the restore was not acknowledged: parameters may still be changed\0"),
+    (GIB_ERR_DISABLED, "the function is switched off\0"),
+    (GIB_ERR_IO, "a file could not be read or written\0"),
+    (GIB_ERR_FORMAT, "the text does not have the expected format\0"),
+    (GIB_ERR_VERSION, "this library cannot serve that ABI version\0"),
+    (GIB_ERR_BACKLASH_NO_RISE, "the torque never rose after the reversal\0"),
+    (GIB_ERR_BACKLASH_LIMIT, "the detection limit was reached before the table broke away\0"),
+    (GIB_ERR_BACKLASH_NOISE, "the stiffness line is lost in the torque noise\0"),
+    (GIB_ERR_BACKLASH_DIRECTIONS, "the two directions disagree beyond their uncertainties\0"),
+    (GIB_ERR_BACKLASH_RESOLUTION, "the lost motion is below what encoder and noise resolve\0"),
+    (GIB_ERR_BACKLASH_SHAPE, "the torque curve is not a release, a clearance and a wind-up\0"),
+    (GIB_ERR_BACKLASH_MOTOR_FRICTION, "motor-side friction could not be told from the wind-up\0"),
+];
+
+/// The text of a status, NUL-terminated and static; for an unknown number a text that says so.
+#[must_use]
+pub fn status_text(status: i32) -> &'static str {
+    TEXTS.iter().find(|(number, _)| *number == status).map_or("unknown status number\0", |(_, text)| text)
+}
+
+/// What went wrong with one named value: enough for a caller to say it without a manual.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fault {
+    /// One of the `GIB_ERR_…` numbers.
+    pub code: i32,
+    /// Name of the field or input at fault, NUL-terminated; `"\0"` where no single one is.
+    pub field: &'static str,
+    /// The value found.
+    pub value: f64,
+    /// The smallest and largest value allowed.
+    pub low: f64,
+    pub high: f64,
+}
+
+impl Fault {
+    /// No fault.
+    pub const NONE: Fault = Fault { code: GIB_OK, field: "\0", value: 0.0, low: 0.0, high: 0.0 };
+
+    /// A fault that no single field explains.
+    #[must_use]
+    pub const fn of(code: i32) -> Fault {
+        Fault { code, ..Fault::NONE }
+    }
+}
+
+/// Checks that a configuration value is finite and within `[low, high]`.
+///
+/// # Errors
+/// `GIB_ERR_CONFIG` with the field's name, the value and the bounds.
+pub fn in_range(field: &'static str, value: f64, low: f64, high: f64) -> Result<f64, Fault> {
+    if value >= low && value <= high { Ok(value) } else { Err(Fault { code: GIB_ERR_CONFIG, field, value, low, high }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_unique_and_texts_end_in_nul() {
+        for (i, (number, text)) in TEXTS.iter().enumerate() {
+            assert!(TEXTS[i + 1..].iter().all(|(other, _)| other != number), "{number} twice");
+            assert!(text.ends_with('\0') && text.matches('\0').count() == 1, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn not_a_number_is_out_of_every_range() {
+        assert_eq!(in_range("a\0", f64::NAN, -1.0, 1.0).unwrap_err().field, "a\0");
+        assert!(in_range("a\0", f64::INFINITY, -1.0, f64::MAX).is_err());
+        assert_eq!(in_range("a\0", 1.0, 1.0, 1.0), Ok(1.0));
+    }
+}

@@ -1,0 +1,19 @@
+//! gib: the layer between an NC kernel and the metal. This page is the map of the rooms.
+//!
+//! Data flows one way: a room may use the rooms above it, never those below.
+//!
+//! | room | purpose |
+//! |---|---|
+//! | [`units`], [`error`] | conversions; status numbers and texts |
+//! | [`cycle`] | HOT: one machine function a file or folder, called once per servo cycle |
+//! | [`abi`] | the C surface: guard, types, one file a family; nothing but translation |
+
+#![deny(unsafe_op_in_unsafe_fn)]
+#![warn(missing_docs)]
+
+pub mod error;
+pub mod units;
+
+pub mod cycle;
+
+pub mod abi;

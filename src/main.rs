@@ -1,0 +1,2 @@
+//! The `gib` command.
+fn main() {}
