@@ -6,6 +6,7 @@
 //! |---|---|
 //! | [`units`], [`error`] | conversions; status numbers and texts |
 //! | [`cycle`] | HOT: one machine function a file or folder, called once per servo cycle |
+//! | [`recording`] | what was measured: columns, units, CSV, Parquet |
 //! | [`abi`] | the C surface: guard, types, one file a family; nothing but translation |
 
 #![deny(unsafe_op_in_unsafe_fn)]
@@ -15,5 +16,7 @@ pub mod error;
 pub mod units;
 
 pub mod cycle;
+
+pub mod recording;
 
 pub mod abi;
