@@ -115,8 +115,9 @@ pub struct Fault {
     pub field: &'static str,
     /// The value found.
     pub value: f64,
-    /// The smallest and largest value allowed.
+    /// The smallest value allowed.
     pub low: f64,
+    /// The largest value allowed.
     pub high: f64,
 }
 
