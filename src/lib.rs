@@ -7,6 +7,7 @@
 //! | [`units`], [`error`] | conversions; status numbers and texts |
 //! | [`cycle`] | HOT: one machine function a file or folder, called once per servo cycle |
 //! | [`recording`] | what was measured: columns, units, CSV, Parquet |
+//! | [`analysis`] | what can be read off a recording without a model: inspection, lost motion |
 //! | [`abi`] | the C surface: guard, types, one file a family; nothing but translation |
 
 #![deny(unsafe_op_in_unsafe_fn)]
@@ -18,5 +19,7 @@ pub mod units;
 pub mod cycle;
 
 pub mod recording;
+
+pub mod analysis;
 
 pub mod abi;

@@ -1,2 +1,7 @@
-//! The `gib` command.
-fn main() {}
+//! The `gib` command: one file a subcommand in `cli`.
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::run()
+}

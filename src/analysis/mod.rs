@@ -1,0 +1,5 @@
+//! What can be read off a recording without a model of the machine.
+
+pub mod inspection;
+pub mod motion;
+pub mod statistics;

@@ -1,0 +1,133 @@
+//! Robust statistics of one sampled signal: noise, grid, hold. None of them is moved by a few wild values.
+
+/// Standard deviation of a normal distribution over its median absolute deviation.
+const STD_PER_MAD: f64 = 1.482_602_218_505_602;
+
+/// The most values looked at for a grid; more would only take time.
+const GRID_SAMPLE: usize = 20_000;
+
+/// The median; `None` without finite values.
+#[must_use]
+pub fn median(values: &[f64]) -> Option<f64> {
+    quantile(values, 0.5)
+}
+
+/// The quantile `share` (0 to 1) by nearest rank; `None` without finite values.
+#[must_use]
+pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
+    let mut finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    if finite.is_empty() {
+        return None;
+    }
+    let rank = ((finite.len() - 1) as f64 * share.clamp(0.0, 1.0)).round() as usize;
+    Some(*finite.select_nth_unstable_by(rank, f64::total_cmp).1)
+}
+
+/// Standard deviation of white noise on a smooth signal, in the signal's unit: the fourth difference removes what a cubic
+/// follows within five rows, and white noise of standard deviation s leaves it with s·√70.
+/// (von Neumann's mean square successive difference, one order higher, with a median in place of the mean.)
+#[must_use]
+pub fn white_noise(values: &[f64]) -> Option<f64> {
+    let fourth: Vec<f64> =
+        values.windows(5).map(|v| (v[0] - 4.0 * v[1] + 6.0 * v[2] - 4.0 * v[3] + v[4]).abs()).collect();
+    Some(STD_PER_MAD * median(&fourth)? / 70f64.sqrt())
+}
+
+/// The step all values are multiples of, in the signal's unit: an encoder's grid, or the last printed decimal; `None` for
+/// values that show no grid.
+#[must_use]
+pub fn grid(values: &[f64]) -> Option<f64> {
+    let stride = (values.len() / GRID_SAMPLE).max(1);
+    let mut sorted: Vec<f64> = values.iter().copied().step_by(stride).filter(|value| value.is_finite()).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let span = sorted.first()?.abs().max(sorted.last()?.abs());
+    let steps: Vec<f64> = sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 1e-12 * span).collect();
+    if steps.len() < 4 {
+        return None;
+    }
+    let mut step = steps.iter().copied().fold(f64::INFINITY, f64::min);
+    // Small multiples fix the step to a few per cent, larger ones then to the last digit.
+    for most in [1.5, 4.5, 20.5, 100.5] {
+        let near = steps.iter().filter(|s| **s < most * step);
+        let (sum, count) = near.fold((0.0, 0.0), |(sum, count), s| (sum + s, count + (s / step).round()));
+        step = sum / count;
+    }
+    let fits = |s: &&f64| (*s / step - (*s / step).round()).abs() < 0.15;
+    let close: Vec<&f64> = steps.iter().filter(|s| **s < 20.0 * step).collect();
+    let fitting = close.iter().filter(|s| fits(s)).count();
+    (close.len() >= 4 && fitting * 20 >= close.len() * 19).then_some(step)
+}
+
+/// Rows for which a moving signal keeps each value: 1 when every row is fresh, n when it is updated every n rows (a slower
+/// fieldbus, or a zero-order hold). Steps of one grid are ignored: they are slow motion, not a hold.
+#[must_use]
+pub fn hold_rows(values: &[f64], grid: f64) -> usize {
+    let mut lengths = Vec::new();
+    let mut last = 0;
+    let mut last_was_large = false;
+    for row in 1..values.len() {
+        let step = (values[row] - values[row - 1]).abs();
+        if step > 0.0 {
+            let large = step > 2.5 * grid;
+            if large && last_was_large {
+                lengths.push((row - last) as f64);
+            }
+            (last, last_was_large) = (row, large);
+        }
+    }
+    if lengths.len() < 10 {
+        return 1;
+    }
+    median(&lengths).map_or(1, |rows| rows as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numerical Recipes' `ranqd1`-like generator, good enough for noise; the seed is the argument.
+    fn noise(seed: u64) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        move || {
+            let mut uniform = || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 11) as f64 / (1u64 << 53) as f64
+            };
+            (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+        }
+    }
+
+    #[test]
+    fn noise_is_told_from_motion() {
+        let mut normal = noise(7);
+        let values: Vec<f64> = (0..5000).map(|i| 100.0 * (f64::from(i) * 0.01).sin() + 0.02 * normal()).collect();
+        let found = white_noise(&values).unwrap();
+        assert!((0.0185..0.0215).contains(&found), "{found}");
+        let clean: Vec<f64> = (0..5000).map(|i| 100.0 * (f64::from(i) * 0.001).sin()).collect();
+        assert!(white_noise(&clean).unwrap() < 1e-9);
+    }
+
+    #[test]
+    fn grids_are_found_also_when_printed_on_another_grid() {
+        for (step, printed) in [(0.05e-3, 1e-6), (1e-3, 1e-7), (10.0 / 131_072.0, 1e-7), (360.0 / 8192.0, 1e-5)] {
+            let value = |i: i32| {
+                let x: f64 = 3.0 * (f64::from(i) * 0.002).sin();
+                (x / step).round() * step
+            };
+            let values: Vec<f64> = (0..8000).map(|i| (value(i) / printed).round() * printed).collect();
+            let found = grid(&values).unwrap();
+            assert!((found / step - 1.0).abs() < 0.01, "{found} for {step}");
+        }
+        let mut normal = noise(3);
+        let smooth: Vec<f64> = (0..5000).map(|_| normal()).collect();
+        assert_eq!(grid(&smooth), None);
+    }
+
+    #[test]
+    fn a_hold_is_counted_and_slow_motion_is_none() {
+        let ramp: Vec<f64> = (0..1000).map(|i| f64::from(i / 4) * 0.01).collect();
+        assert_eq!(hold_rows(&ramp, 1e-4), 4);
+        let slow: Vec<f64> = (0..1000).map(|i| (f64::from(i) * 0.2).floor() * 1e-4).collect();
+        assert_eq!(hold_rows(&slow, 1e-4), 1);
+    }
+}

@@ -1,0 +1,71 @@
+//! The command line: what is asked, which file answers it, and with which exit code it ends.
+//!
+//! A command is a struct of arguments with `run(&self) -> cli::Result`. It returns its whole text; errors go to standard
+//! error as one sentence.
+
+mod inspect;
+mod table;
+
+use std::error::Error;
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// What a command has to say.
+pub struct Answer {
+    /// Goes to standard output.
+    pub text: String,
+    /// False when the question was understood and the answer is no: a value refused, a verdict that asks for action.
+    pub good: bool,
+}
+
+impl Answer {
+    /// A plain answer.
+    pub fn good(text: String) -> Self {
+        Self { text, good: true }
+    }
+}
+
+/// What a command returns; an error ends with exit code 2.
+pub type Result = std::result::Result<Answer, Box<dyn Error>>;
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  done
+  1  the answer is no: a value was refused, or the verdict asks for action (the text says which)
+  2  wrong usage, or a file that cannot be used (the message says where and why)";
+
+/// The layer between an NC kernel and the metal.
+///
+/// Measures lost motion, shows what a simulation gets wrong, and looks into recordings of a machine. Recordings are CSV with
+/// the columns time_s, then <channel>.<signal>_<unit>, for example x.position_mm.
+#[derive(Parser)]
+#[command(name = "gib", version, after_help = EXIT_CODES, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Inspect(inspect::Inspect),
+}
+
+/// Runs the command that was asked for.
+pub fn run() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Inspect(command) => command.run(),
+    };
+    match result {
+        Ok(answer) => {
+            // A reader that has seen enough (`gib … | head`) is no error.
+            let _ = std::io::stdout().write_all(answer.text.as_bytes());
+            ExitCode::from(u8::from(!answer.good))
+        }
+        Err(why) => {
+            eprintln!("gib: {why}");
+            ExitCode::from(2)
+        }
+    }
+}
