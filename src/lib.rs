@@ -7,6 +7,7 @@
 //! | [`units`], [`error`] | conversions; status numbers and texts |
 //! | [`cycle`] | HOT: one machine function a file or folder, called once per servo cycle |
 //! | [`recording`] | what was measured: columns, units, CSV, Parquet |
+//! | [`machine`] | `machine.json`: belief and effects, the vocabulary of causes |
 //! | [`analysis`] | what can be read off a recording without a model: inspection, lost motion |
 //! | [`abi`] | the C surface: guard, types, one file a family; nothing but translation |
 
@@ -18,6 +19,7 @@ pub mod units;
 
 pub mod cycle;
 
+pub mod machine;
 pub mod recording;
 
 pub mod analysis;
