@@ -3,37 +3,21 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-/// Every `.rs` file below `folder`, in the order of its path.
-fn rust_files(folder: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            files.extend(rust_files(&path));
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            files.push(path);
-        }
-    }
-    files.sort();
-    files
-}
+mod support;
+use support::{code, files, functions, header, plain, root};
 
 /// The files that C sees: the status numbers, the cycle room's structs that cross as they are, then the C surface
 /// with its table last.
 fn sources() -> Vec<PathBuf> {
-    let mut files = vec![root().join("src/error.rs")];
+    let mut sources = vec![root().join("src/error.rs")];
     let crosses = |path: &PathBuf| fs::read_to_string(path).unwrap().contains("\n#[repr(C)]");
-    files.extend(rust_files(&root().join("src/cycle")).into_iter().filter(crosses));
-    let mut surface = rust_files(&root().join("src/abi"));
+    sources.extend(files(&root().join("src/cycle"), &["rs"]).into_iter().filter(crosses));
+    let mut surface = files(&root().join("src/abi"), &["rs"]);
     surface.sort_by_key(|path| (!path.ends_with("mod.rs"), path.ends_with("api.rs")));
-    files.extend(surface);
-    files
+    sources.extend(surface);
+    sources
 }
 
 /// `GibBacklash` is `gib_backlash` in C, and a cycle type `BacklashInput` is `gib_backlash_input`.
@@ -91,43 +75,16 @@ fn texts() -> Vec<String> {
     sources().iter().map(|path| fs::read_to_string(path).unwrap()).collect()
 }
 
-/// The declarations of the functions in a header, `name -> return type and parameters`, without line breaks.
-fn functions(header: &str) -> BTreeMap<String, String> {
-    let code: String = header
-        .split_once("extern \"C\" {")
-        .unwrap()
-        .1
-        .lines()
-        .filter(|line| !line.starts_with([' ', '#', '/', '}']) || line.starts_with("  "))
-        .filter(|line| !line.trim_start().starts_with('*'))
-        .collect::<Vec<_>>()
-        .join(" ");
-    code.split(';')
-        .filter_map(|declaration| {
-            let (head, parameters) = declaration.split_once('(')?;
-            let name = head.rsplit([' ', '*']).next()?.to_string();
-            let returns = head.trim().strip_suffix(&name)?;
-            Some((name, shape(returns) + "(" + &shape(parameters)))
-        })
-        .collect()
-}
-
 /// The members of the table that are function pointers, in the same form as `functions`.
 fn table(header: &str) -> BTreeMap<String, String> {
     let body = header.split_once("typedef struct gib_api_table {").unwrap().1.split_once("} gib_api_table;").unwrap().0;
-    let code = body.lines().filter(|l| !l.trim_start().starts_with(['/', '*'])).collect::<Vec<_>>().join(" ");
-    code.split(';')
-        .filter_map(|member| {
-            let (returns, rest) = member.split_once("(*")?;
-            let (name, parameters) = rest.split_once(')')?;
-            Some((name.to_string(), shape(returns) + &shape(parameters)))
-        })
-        .collect()
-}
-
-/// A piece of a declaration with its blanks made alike.
-fn shape(code: &str) -> String {
-    code.split_whitespace().collect::<Vec<_>>().join(" ").replace("* ", "*")
+    let mut members = BTreeMap::new();
+    for member in code(body).split(';') {
+        let Some((returns, rest)) = member.split_once("(*") else { continue };
+        let (name, parameters) = rest.split_once(')').unwrap();
+        members.insert(name.to_string(), plain(&format!("{returns} {parameters}")));
+    }
+    members
 }
 
 #[test]
@@ -149,7 +106,7 @@ fn committed_header_is_fresh() {
 fn a_changed_comment_makes_the_header_stale() {
     let mut texts = texts();
     texts[0] = texts[0].replacen("A required pointer is NULL.", "A required pointer is missing.", 1);
-    assert!(generate(&texts) != fs::read_to_string(root().join("include/gib.h")).unwrap());
+    assert!(generate(&texts) != header());
 }
 
 /// The table's member for a function is the function's name without `gib_`.
@@ -170,8 +127,8 @@ fn missing_from_table(header: &str) -> Vec<String> {
 
 #[test]
 fn table_has_every_function_with_its_signature() {
-    let header = fs::read_to_string(root().join("include/gib.h")).unwrap();
-    assert!(functions(&header).contains_key("gib_api"), "{:?}", functions(&header));
+    let header = header();
+    assert!(functions(&header).len() >= 4, "{:?}", functions(&header));
     assert_eq!(missing_from_table(&header), Vec::<String>::new(), "add them to src/abi/api.rs");
     for fault in [
         header.replace("(*status_text)(int32_t", "(*status_text)(int64_t"),
