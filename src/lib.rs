@@ -6,6 +6,7 @@
 //! |---|---|
 //! | [`units`], [`error`] | conversions; status numbers and texts |
 //! | [`cycle`] | HOT: one machine function a file or folder, called once per servo cycle |
+//! | [`program`] | INA in the head of a part program: read, written, removed |
 //! | [`recording`] | what was measured: columns, units, CSV, Parquet |
 //! | [`machine`] | `machine.json`: belief and effects, the vocabulary of causes |
 //! | [`analysis`] | what can be read off a recording without a model: inspection, lost motion |
@@ -20,6 +21,7 @@ pub mod units;
 pub mod cycle;
 
 pub mod machine;
+pub mod program;
 pub mod recording;
 
 pub mod analysis;

@@ -4,6 +4,7 @@
 //! error as one sentence.
 
 mod inspect;
+mod program;
 mod table;
 
 use std::error::Error;
@@ -50,12 +51,14 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Inspect(inspect::Inspect),
+    Program(program::Program),
 }
 
 /// Runs the command that was asked for.
 pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Inspect(command) => command.run(),
+        Command::Program(command) => command.run(),
     };
     match result {
         Ok(answer) => {
