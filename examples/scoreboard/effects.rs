@@ -1,0 +1,281 @@
+//! The causes of the vocabulary as the generator hides them: random parameters within what real machines show, how each
+//! changes the true machine, and the parameters under the keys of the files, against which a diagnosis is scored.
+
+use crate::random::Random;
+use crate::rig::{Drive, Rig};
+use crate::truth::{Coupling, Sine, Truth};
+use serde_json::{Value, json};
+use std::f64::consts::TAU;
+
+pub const CAUSES: [&str; 19] = [
+    "inertia_mismatch",
+    "coulomb_friction_mismatch",
+    "viscous_friction_mismatch",
+    "constant_torque",
+    "direction_dependent_friction",
+    "stribeck_friction",
+    "presliding_friction",
+    "backlash",
+    "drive_compliance",
+    "cogging",
+    "position_dependent_friction",
+    "cable_force",
+    "quadratic_drag",
+    "thermal_drift",
+    "dead_time",
+    "external_vibration",
+    "torque_saturation",
+    "screw_pitch_error",
+    "screw_periodic_error",
+];
+
+/// Resonance of the stiff flanks of a clearance, Hz: far above what a servo sees, so that only the clearance shows.
+const FLANK_HZ: f64 = 900.0;
+
+/// A hidden effect: `amount` is the one number that makes it larger or smaller, `form` what else describes it.
+#[derive(Clone, Debug)]
+pub struct Effect {
+    pub cause: &'static str,
+    /// In the truth's units, always positive.
+    pub amount: f64,
+    pub low: f64,
+    pub high: f64,
+    /// About how its trace grows with the amount: trace ∝ amount^power.
+    pub power: f64,
+    pub sign: f64,
+    form: [f64; 3],
+}
+
+/// One parameter as the files have it.
+pub struct Parameter {
+    pub key: String,
+    pub value: f64,
+    /// What an error is measured against.
+    pub scale: f64,
+    /// Whether the contract asks a diagnosis for it, or it only completes the machine file.
+    pub scored: bool,
+}
+
+/// Whether a cause can be on such a rig at all.
+pub fn possible(cause: &str, rig: &Rig) -> bool {
+    match cause {
+        "backlash" => rig.drive != Drive::Linear && rig.gearing > 1.0,
+        "drive_compliance" => rig.drive != Drive::Rotary,
+        "quadratic_drag" | "screw_pitch_error" => rig.drive != Drive::Rotary,
+        "screw_periodic_error" => rig.drive == Drive::BallScrew,
+        _ => true,
+    }
+}
+
+/// Whether a cause shows only between table and encoder.
+pub fn on_table_only(cause: &str) -> bool {
+    cause.starts_with("screw_")
+}
+
+/// Whether two causes may be hidden together: not two of those that all act within the lost motion of one reversal.
+pub fn separable(a: &str, b: &str) -> bool {
+    let lost_motion = |c: &str| ["presliding_friction", "backlash", "drive_compliance"].contains(&c);
+    a != b && !(lost_motion(a) && lost_motion(b))
+}
+
+impl Effect {
+    /// Draws one; `peak` is the largest torque of the belief's own run.
+    pub fn draw(cause: &'static str, rig: &Rig, peak: f64, r: &mut Random) -> Self {
+        let tc = rig.coulomb;
+        let stroke = rig.reach.high - rig.reach.low;
+        let mut sign = r.sign();
+        let mut form = [0.0; 3];
+        let (low, high, power) = match cause {
+            "inertia_mismatch" => (0.03 * rig.inertia, 0.5 * rig.inertia, 1.0),
+            "coulomb_friction_mismatch" => (0.03 * tc, 0.6 * tc, 1.0),
+            "viscous_friction_mismatch" => (0.05 * rig.viscous, 0.8 * rig.viscous, 1.0),
+            "constant_torque" => {
+                // In one of three the Coulomb levels of the two directions differ, which slides like a constant torque.
+                form[0] = f64::from(r.chance(0.3));
+                (0.03 * tc, if form[0] > 0.0 { 0.5 } else { 1.0 } * tc, 1.0)
+            }
+            "direction_dependent_friction" => (0.05 * rig.viscous, 0.6 * rig.viscous, 1.0),
+            "stribeck_friction" => {
+                form[0] = rig.reach.speed * r.log_uniform(0.005, 0.06);
+                (0.1 * tc, 0.6 * tc, 1.0)
+            }
+            "presliding_friction" => {
+                form[0] = if r.chance(0.5) { 0.0 } else { r.uniform(0.05, 0.5) };
+                (1e-3, 0.15, 0.5)
+            }
+            "backlash" => {
+                form = [r.uniform(0.3, 0.6), r.uniform(0.5, 0.9), 0.0];
+                (3e-3, 0.15, 0.5)
+            }
+            "drive_compliance" => {
+                form = [r.uniform(0.2, 0.5), r.uniform(0.5, 0.9), r.uniform(0.01, 0.08)];
+                let fastest = (0.12 / rig.servo.period).min(150.0);
+                (1.0 / fastest.powi(2), 1.0 / 15f64.powi(2), 1.0)
+            }
+            "cogging" => {
+                form = [
+                    match rig.drive {
+                        Drive::BallScrew => {
+                            let n = r.pick(&[1, rig.pole_pairs, 2 * rig.pole_pairs, 6 * rig.pole_pairs]);
+                            (rig.gearing / f64::from(n)).max(0.4)
+                        }
+                        Drive::Linear => r.pick(&[12.0, 16.0, 20.0, 24.0, 30.0, 32.0]),
+                        Drive::Rotary => (360.0 / rig.gearing).min(360.0 / f64::from(2 * rig.pole_pairs)),
+                    },
+                    r.phase(),
+                    0.0,
+                ];
+                (0.02 * tc, 0.6 * tc, 1.0)
+            }
+            "position_dependent_friction" => {
+                sign = if r.chance(0.85) { 1.0 } else { -1.0 };
+                form = [rig.reach.low + stroke * r.uniform(0.15, 0.85), stroke * r.log_uniform(0.04, 0.15), 0.0];
+                (0.1 * tc, if sign > 0.0 { 1.5 } else { 0.7 } * tc, 1.0)
+            }
+            "cable_force" => {
+                form[0] = if r.chance(0.5) { 0.0 } else { 0.5 * (rig.reach.low + rig.reach.high) };
+                (0.05 * tc / stroke, 1.5 * tc / stroke, 1.0)
+            }
+            "quadratic_drag" => {
+                sign = 1.0;
+                let v = rig.reach.speed * 1e-3;
+                (0.05 * tc / (v * v), 2.0 * tc / (v * v), 1.0)
+            }
+            "thermal_drift" => {
+                sign = 1.0;
+                form[0] = rig.duration * r.uniform(0.12, 0.5);
+                (0.06 * tc, 0.8 * tc, 1.0)
+            }
+            "dead_time" => (1e-4, 4e-3, 1.0),
+            "external_vibration" => {
+                form = [r.log_uniform(4.0, (0.1 / rig.servo.period).min(80.0)), r.phase(), 0.0];
+                (0.02 * tc, 0.6 * tc, 1.0)
+            }
+            "torque_saturation" => {
+                form[0] = r.pick(&[0.0, 0.0, 0.3, 0.5, 0.7]);
+                (0.05 * peak, 0.5 * peak, 1.3)
+            }
+            "screw_pitch_error" => (5e-6, 5e-4, 1.0),
+            "screw_periodic_error" => {
+                form = [rig.gearing / r.pick(&[1.0, 1.0, 2.0]), r.phase(), 0.0];
+                (3e-4, 2e-2, 1.0)
+            }
+            _ => unreachable!("{cause} is not in the vocabulary"),
+        };
+        if cause == "torque_saturation" {
+            form[1] = peak;
+        }
+        Self { cause, amount: r.log_uniform(low, high), low, high, power, sign, form }
+    }
+
+    /// Phases belong to a recording (the encoder's zero and the clock start anew), not to the machine.
+    pub fn new_phase(&mut self, r: &mut Random) {
+        if ["cogging", "external_vibration", "screw_periodic_error"].contains(&self.cause) {
+            self.form[1] = r.phase();
+        }
+    }
+
+    fn coupling(&self, rig: &Rig) -> Coupling {
+        let share = self.form[0];
+        let reduced = rig.inertia * share * (1.0 - share);
+        let (hz, damping_ratio, clearance) = if self.cause == "backlash" {
+            (FLANK_HZ, 0.2, self.amount / rig.unit)
+        } else {
+            (self.amount.powf(-0.5), self.form[2], 0.0)
+        };
+        let stiffness = reduced * (TAU * hz).powi(2);
+        let damping = 2.0 * damping_ratio * (stiffness * reduced).sqrt();
+        Coupling { stiffness, damping, clearance, inertia_share: share, friction_share: self.form[1] }
+    }
+
+    /// Puts the effect into the true machine.
+    pub fn apply(&self, rig: &Rig, truth: &mut Truth) {
+        let (size, form) = (self.sign * self.amount, &self.form);
+        match self.cause {
+            "inertia_mismatch" => truth.inertia += size,
+            "coulomb_friction_mismatch" => truth.coulomb += size,
+            "viscous_friction_mismatch" => truth.viscous += size,
+            "constant_torque" if form[0] > 0.0 => truth.coulomb_by_direction = size,
+            "constant_torque" => truth.constant += size,
+            "direction_dependent_friction" => truth.asymmetry = size,
+            "stribeck_friction" => truth.stribeck = (size, form[0]),
+            "presliding_friction" => {
+                truth.presliding = self.amount / rig.unit;
+                truth.bristle_damping = form[0];
+            }
+            "backlash" | "drive_compliance" => truth.coupling = Some(self.coupling(rig)),
+            "cogging" => truth.cogging = Sine { amplitude: self.amount, period: form[0], phase: form[1] },
+            "position_dependent_friction" => truth.spot = (form[0], size, form[1]),
+            "cable_force" => truth.cable = (size, form[0]),
+            "quadratic_drag" => truth.drag = size,
+            "thermal_drift" => truth.drift = (size, form[0]),
+            "dead_time" => truth.delay = size,
+            "external_vibration" => {
+                truth.vibration = Sine { amplitude: self.amount, period: 1.0 / form[0], phase: form[1] }
+            }
+            "torque_saturation" => truth.saturation = Some((form[1] - self.amount, form[0])),
+            "screw_pitch_error" => truth.pitch = size,
+            "screw_periodic_error" => {
+                truth.pitch_wave = Sine { amplitude: self.amount, period: form[0], phase: form[1] }
+            }
+            _ => unreachable!(),
+        }
+    }
+
+    /// The true parameters under the keys of the files.
+    pub fn parameters(&self, rig: &Rig) -> Vec<Parameter> {
+        let (size, form) = (self.sign * self.amount, &self.form);
+        let stroke = rig.reach.high - rig.reach.low;
+        let scored = |key: &str, value: f64| Parameter { key: rig.key(key), value, scale: value.abs(), scored: true };
+        let extra = |key: &str, value: f64| Parameter { key: rig.key(key), value, scale: value.abs(), scored: false };
+        match self.cause {
+            "inertia_mismatch" => vec![scored("inertia_kg_m2", rig.inertia + size)],
+            "coulomb_friction_mismatch" => vec![scored("coulomb_friction_nm", rig.coulomb + size)],
+            "viscous_friction_mismatch" => vec![scored("viscous_friction_nm_s", rig.viscous + size)],
+            "constant_torque" => {
+                vec![Parameter { scale: size.abs(), ..scored("constant_torque_nm", rig.constant + size) }]
+            }
+            "direction_dependent_friction" => vec![scored("asymmetry_nm_s", size)],
+            "stribeck_friction" => vec![scored("stribeck_torque_nm", size), scored("stribeck_velocity_mm_s", form[0])],
+            "presliding_friction" => vec![scored("presliding_um", self.amount * 1e3)],
+            "backlash" => vec![
+                scored("backlash_um", self.amount * 1e3),
+                extra("table_inertia_share", form[0]),
+                extra("table_friction_share", form[1]),
+            ],
+            "drive_compliance" => {
+                let c = self.coupling(rig);
+                // Stiffness at the motor over (mm per unit of q)²: 1 N·m/mm² = 10⁶ N/m = 1 N/µm.
+                let newton_per_um = c.stiffness / (rig.unit * rig.unit);
+                vec![
+                    scored("resonance_hz", self.amount.powf(-0.5)),
+                    scored("stiffness_n_um", newton_per_um),
+                    extra("table_friction_share", form[1]),
+                    extra("damping_ratio", form[2]),
+                ]
+            }
+            "cogging" => vec![scored("amplitude_nm", self.amount), scored("period_mm", form[0])],
+            "position_dependent_friction" => vec![
+                Parameter { scale: 0.1 * stroke, ..scored("centre_mm", form[0]) },
+                scored("peak_nm", size),
+                extra("width_mm", form[1]),
+            ],
+            "cable_force" => vec![scored("slope_nm_mm", size), extra("zero_mm", form[0])],
+            "quadratic_drag" => vec![scored("drag_nm_s2_m2", size)],
+            "thermal_drift" => vec![scored("drop_nm", size), scored("time_constant_s", form[0])],
+            "dead_time" => vec![scored("delay_ms", size * 1e3)],
+            "external_vibration" => vec![scored("frequency_hz", form[0]), scored("amplitude_nm", self.amount)],
+            "torque_saturation" => vec![scored("limit_nm", form[1] - self.amount), extra("slope_ratio", form[0])],
+            "screw_pitch_error" => vec![scored("scale_um_m", size * 1e6)],
+            "screw_periodic_error" => vec![scored("amplitude_um", self.amount * 1e3), scored("period_mm", form[0])],
+            _ => unreachable!(),
+        }
+    }
+
+    /// The entry of `effects` that describes it.
+    pub fn entry(&self, rig: &Rig) -> Value {
+        let parameters: serde_json::Map<String, Value> =
+            self.parameters(rig).into_iter().map(|p| (p.key, json!(p.value))).collect();
+        json!({ "cause": self.cause, "parameters": parameters })
+    }
+}

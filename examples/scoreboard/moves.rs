@@ -1,0 +1,219 @@
+//! Commanded motion: what an interpolator would ask of the axis in an identification run, drawn at random.
+//!
+//! A move is a trapezoid of speed (or a triangle, when the way is too short for the speed); a moving average over a fixed
+//! time turns the trapezoids into S-curves of bounded jerk. Positions are in the load's unit (mm or deg), times in s.
+
+use crate::random::Random;
+
+/// What the axis can do, in load units.
+#[derive(Clone, Copy, Debug)]
+pub struct Reach {
+    pub low: f64,
+    pub high: f64,
+    /// Rapid speed, units/s.
+    pub speed: f64,
+    /// Acceleration, units/s².
+    pub acceleration: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Segment {
+    /// Go to a position at a speed with an acceleration.
+    Move { to: f64, speed: f64, acceleration: f64 },
+    /// Stand still for a time.
+    Dwell { time: f64 },
+    /// Whole cosine cycles about a point half an amplitude away: position = start + amplitude/2·(1 − cos 2πft).
+    Wave { amplitude: f64, frequency: f64, cycles: usize },
+}
+
+/// Draws a run of about `duration` s. Every run holds a rapid across most of the stroke, a sweep each way at a middle speed,
+/// slow reversals and a dwell, in random order; the rest is filled at random. `slow_share` (0..1) asks for more slow reversals.
+pub fn draw(random: &mut Random, reach: &Reach, duration: f64, slow_share: f64) -> (f64, Vec<Segment>) {
+    let start = random.uniform(reach.low, reach.high);
+    let mut at = start;
+    let mut time = 0.0;
+    let mut segments = Vec::new();
+    let mut push = |s: Segment, at: &mut f64, time: &mut f64| {
+        *time += length(*at, &s);
+        if let Segment::Move { to, .. } = s {
+            *at = to;
+        }
+        segments.push(s);
+    };
+    push(Segment::Dwell { time: random.uniform(0.1, 0.4) }, &mut at, &mut time);
+    let mut wanted = vec![0, 1, 2, 2, 3, 4];
+    for i in (1..wanted.len()).rev() {
+        wanted.swap(i, random.uniform(0.0, (i + 1) as f64) as usize);
+    }
+    while time < duration {
+        let kind = wanted
+            .pop()
+            .unwrap_or_else(|| if random.chance(slow_share) { 2 } else { random.pick(&[0, 0, 1, 2, 3, 4]) });
+        let stroke = reach.high - reach.low;
+        let acceleration = reach.acceleration * random.uniform(0.5, 1.0);
+        match kind {
+            0 => {
+                // Rapids to and fro, mostly long ones.
+                for _ in 0..random.pick(&[1, 2, 3]) {
+                    let far = if at > 0.5 * (reach.low + reach.high) { reach.low } else { reach.high };
+                    let to = at + (far - at) * random.uniform(0.5, 1.0);
+                    let speed = reach.speed * random.uniform(0.4, 1.0);
+                    push(Segment::Move { to, speed, acceleration }, &mut at, &mut time);
+                    push(Segment::Dwell { time: random.uniform(0.05, 0.3) }, &mut at, &mut time);
+                }
+            }
+            1 => {
+                // A sweep there and back at a middle speed, no slower than an eighth of the run allows.
+                let speed = (reach.speed * random.log_uniform(0.04, 0.4)).max(4.0 * stroke / duration);
+                let (first, second) =
+                    if random.chance(0.5) { (reach.low, reach.high) } else { (reach.high, reach.low) };
+                for end in [first, second] {
+                    push(Segment::Move { to: end, speed, acceleration }, &mut at, &mut time);
+                }
+            }
+            2 => {
+                // A train of slow reversals about the present position, each long enough to be at constant speed.
+                let speed = reach.speed * random.log_uniform(0.002, 0.05);
+                let share = random.uniform(0.04, 0.12) * duration;
+                let count = random.pick(&[2usize, 4, 6]);
+                let travel = (speed * share / count as f64).min(0.4 * stroke);
+                let way = if at + travel > reach.high { -1.0 } else { 1.0 };
+                for i in 0..count {
+                    let to = at + if i % 2 == 0 { way * travel } else { -way * travel };
+                    push(Segment::Move { to, speed, acceleration: acceleration * 0.3 }, &mut at, &mut time);
+                    if random.chance(0.3) {
+                        push(Segment::Dwell { time: random.uniform(0.02, 0.2) }, &mut at, &mut time);
+                    }
+                }
+            }
+            3 => push(Segment::Dwell { time: random.uniform(0.1, 0.5) }, &mut at, &mut time),
+            _ => {
+                let frequency = random.log_uniform(0.4, 3.0);
+                let omega = std::f64::consts::TAU * frequency;
+                let limit = (reach.speed / omega).min(0.8 * reach.acceleration / (omega * omega)).min(0.3 * stroke);
+                let way = if at + limit > reach.high { -1.0 } else { 1.0 };
+                let amplitude = way * limit * random.uniform(0.3, 1.0);
+                let cycles = random.pick(&[2usize, 3, 5]);
+                push(Segment::Wave { amplitude, frequency, cycles }, &mut at, &mut time);
+            }
+        }
+    }
+    (start, segments)
+}
+
+/// How long a segment takes, s.
+fn length(from: f64, s: &Segment) -> f64 {
+    match *s {
+        Segment::Dwell { time } => time,
+        Segment::Wave { frequency, cycles, .. } => cycles as f64 / frequency,
+        Segment::Move { to, speed, acceleration } => {
+            let way = (to - from).abs();
+            let peak = speed.min((way * acceleration).sqrt());
+            if peak > 0.0 { way / peak + peak / acceleration } else { 0.0 }
+        }
+    }
+}
+
+/// Position on a segment `t` s after its start.
+fn position(from: f64, s: &Segment, t: f64) -> f64 {
+    match *s {
+        Segment::Dwell { .. } => from,
+        Segment::Wave { amplitude, frequency, .. } => {
+            from + 0.5 * amplitude * (1.0 - (std::f64::consts::TAU * frequency * t).cos())
+        }
+        Segment::Move { to, speed, acceleration } => {
+            let way = (to - from).abs();
+            let peak = speed.min((way * acceleration).sqrt());
+            let total = length(from, s);
+            let ramp = peak / acceleration;
+            let travelled = if t < ramp {
+                0.5 * acceleration * t * t
+            } else if t < total - ramp {
+                peak * (t - 0.5 * ramp)
+            } else {
+                let left = (total - t).max(0.0);
+                way - 0.5 * acceleration * left * left
+            };
+            from + (to - from).signum() * travelled
+        }
+    }
+}
+
+/// Samples a run at `period` s for `duration` s; `smoothing` s of moving average make S-curves (0: trapezoids).
+pub fn sample(start: f64, segments: &[Segment], period: f64, duration: f64, smoothing: f64) -> Vec<f64> {
+    let rows = (duration / period).round() as usize;
+    let mut raw = Vec::with_capacity(rows);
+    let (mut at, mut begin) = (start, 0.0);
+    let mut rest = segments.iter();
+    let mut current = rest.next();
+    for i in 0..rows {
+        let t = i as f64 * period;
+        while let Some(s) = current {
+            let end = begin + length(at, s);
+            if t < end {
+                break;
+            }
+            if let Segment::Move { to, .. } = *s {
+                at = to;
+            }
+            begin = end;
+            current = rest.next();
+        }
+        raw.push(current.map_or(at, |s| position(at, s, t - begin)));
+    }
+    let width = ((smoothing / period).round() as usize).max(1);
+    let mut sum = start * width as f64;
+    let mut out = Vec::with_capacity(rows);
+    for i in 0..rows {
+        sum += raw[i] - if i >= width { raw[i - width] } else { start };
+        out.push(sum / width as f64);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const REACH: Reach = Reach { low: 10.0, high: 310.0, speed: 300.0, acceleration: 2000.0 };
+
+    #[test]
+    fn a_trapezoid_takes_the_time_it_should_and_keeps_its_limits() {
+        let s = Segment::Move { to: 100.0, speed: 50.0, acceleration: 500.0 };
+        // way/speed + speed/acceleration
+        assert!((length(0.0, &s) - (2.0 + 0.1)).abs() < 1e-12);
+        assert!((position(0.0, &s, 0.1) - 2.5).abs() < 1e-12);
+        assert!((position(0.0, &s, 2.1) - 100.0).abs() < 1e-12);
+        // Too short for its speed: a triangle of 2·sqrt(way/acceleration).
+        let s = Segment::Move { to: -2.0, speed: 50.0, acceleration: 500.0 };
+        assert!((length(0.0, &s) - 2.0 * (2.0f64 / 500.0).sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn random_runs_keep_stroke_speed_and_acceleration() {
+        for seed in 0..40 {
+            let mut r = Random::new(seed, 1);
+            let (start, segments) = draw(&mut r, &REACH, 15.0, 0.3);
+            for smoothing in [0.0, 0.02] {
+                let x = sample(start, &segments, 1e-3, 15.0, smoothing);
+                assert_eq!(x.len(), 15_000);
+                let (mut fastest, mut slow) = (0.0f64, 0);
+                for w in x.windows(3) {
+                    assert!(w[0] >= REACH.low - 1e-9 && w[0] <= REACH.high + 1e-9, "seed {seed}: {}", w[0]);
+                    let v = (w[1] - w[0]) / 1e-3;
+                    assert!(v.abs() <= REACH.speed * 1.0001, "seed {seed}: {v}");
+                    // A reversal without dwell joins two ramps in one sample.
+                    assert!(
+                        ((w[2] - 2.0 * w[1] + w[0]) / 1e-6).abs() <= 2.0 * REACH.acceleration + 1e-3,
+                        "seed {seed}"
+                    );
+                    fastest = fastest.max(v.abs());
+                    slow += usize::from(v.abs() > 0.0 && v.abs() < 0.06 * REACH.speed);
+                }
+                // Diligence: runs are neither all slow nor all fast.
+                assert!(fastest > 0.3 * REACH.speed, "seed {seed}: {fastest}");
+                assert!(slow > 500, "seed {seed}: {slow}");
+            }
+        }
+    }
+}

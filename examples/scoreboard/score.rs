@@ -1,0 +1,168 @@
+//! Runs the `gib` command on a case as a user would, and scores what it says against the truth.
+
+use crate::case::{Case, Files, Kind};
+use crate::effects::Effect;
+use crate::rig::Rig;
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
+use std::time::Instant;
+
+/// Error and claimed uncertainty of one parameter of a rightly named cause.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParameterScore {
+    pub cause: String,
+    pub key: String,
+    /// |value − true| / scale; `None`: the key is missing.
+    pub error: Option<f64>,
+    /// Whether value ± 1.96 std holds the truth.
+    pub covered: bool,
+}
+
+/// What a diagnosis said about one case.
+#[derive(Clone, Debug, Default)]
+pub struct Score {
+    pub truth: Vec<String>,
+    pub verdict: String,
+    /// Causes in the order they are named.
+    pub named: Vec<String>,
+    pub first_right: bool,
+    /// Each hidden cause: named anywhere.
+    pub found: usize,
+    /// Named causes that were not hidden.
+    pub wrong: usize,
+    /// The first name is wrong, but says that it cannot be told from the hidden one.
+    pub tied: bool,
+    pub parameters: Vec<ParameterScore>,
+    /// Hold-out residual of the extended machine over that of the true one.
+    pub against_truth: Option<f64>,
+    /// Hold-out residual of the true machine over the noise floor: checks the prediction, not the diagnosis.
+    pub truth_over_floor: Option<f64>,
+    /// Hold-out residual of the belief over that of the true machine: what there was to gain.
+    pub to_gain: Option<f64>,
+    pub seconds: f64,
+    pub failure: Option<String>,
+}
+
+/// Names that a hidden effect may rightly go by.
+fn accepted(effect: &Effect, name: &str, rig: &Rig) -> bool {
+    effect.cause == name
+        // A cable whose force is zero elsewhere than at position zero is a slope and a constant.
+        || (effect.cause == "cable_force" && name == "constant_torque" && effect.parameters(rig).iter().any(|p| p.key == "zero_mm" && p.value != 0.0))
+}
+
+fn numbers(v: &Value, key: &str) -> Option<(f64, f64)> {
+    let p = v.get("parameters")?.get(key)?;
+    Some((p.get("value")?.as_f64()?, p.get("std")?.as_f64()?))
+}
+
+/// Scores a diagnosis (the JSON of the contract) against the truth.
+pub fn judge(case: &Case, diagnosis: &Value) -> Score {
+    let text = |v: &Value, key: &str| v.get(key).and_then(Value::as_str).unwrap_or_default().to_string();
+    let none = Vec::new();
+    let findings = diagnosis.get("findings").and_then(Value::as_array).unwrap_or(&none);
+    let named: Vec<String> = findings.iter().map(|f| text(f, "cause")).collect();
+    let is_hidden = |name: &String| case.effects.iter().any(|e| accepted(e, name, &case.rig));
+    let first_right = named.first().is_some_and(|n| case.effects.iter().any(|e| e.cause == n));
+    let tied = !first_right
+        && findings.first().and_then(|f| f.get("indistinguishable_from")).and_then(Value::as_array).is_some_and(
+            |list| list.iter().filter_map(Value::as_str).any(|n| case.effects.iter().any(|e| e.cause == n)),
+        );
+    let mut score = Score {
+        truth: match case.kind {
+            Kind::Outside(name) => vec![format!("outside: {name}")],
+            _ => case.effects.iter().map(|e| e.cause.to_string()).collect(),
+        },
+        verdict: text(diagnosis, "verdict"),
+        first_right,
+        found: case.effects.iter().filter(|e| named.iter().any(|n| n == e.cause)).count(),
+        wrong: named.iter().filter(|n| !is_hidden(n)).count(),
+        tied,
+        named,
+        ..Score::default()
+    };
+    for effect in &case.effects {
+        if let Some(f) = findings.iter().find(|f| text(f, "cause") == effect.cause) {
+            for p in effect.parameters(&case.rig).into_iter().filter(|p| p.scored) {
+                let said = numbers(f, &p.key);
+                score.parameters.push(ParameterScore {
+                    cause: effect.cause.to_string(),
+                    error: said.map(|(value, _)| (value - p.value).abs() / p.scale),
+                    covered: said.is_some_and(|(value, std)| (value - p.value).abs() <= 1.96 * std),
+                    key: p.key,
+                });
+            }
+        }
+    }
+    score
+}
+
+/// Root mean square of the column whose name holds `.residual_`.
+fn residual(path: &Path) -> Option<f64> {
+    let mut reader = csv::Reader::from_path(path).ok()?;
+    let column = reader.headers().ok()?.iter().position(|h| h.contains(".residual_"))?;
+    let (mut sum, mut count) = (0.0, 0);
+    for row in reader.records() {
+        let v: f64 = row.ok()?.get(column)?.parse().ok()?;
+        sum += v * v;
+        count += 1;
+    }
+    (count > 0).then(|| (sum / f64::from(count)).sqrt())
+}
+
+fn predict(gib: &Path, machine: &Path, recording: &Path, out: &Path) -> Option<f64> {
+    let run = Command::new(gib)
+        .arg("predict")
+        .arg("--machine")
+        .arg(machine)
+        .arg("--recording")
+        .arg(recording)
+        .arg("--out")
+        .arg(out)
+        .output();
+    run.ok().filter(|o| o.status.success())?;
+    residual(out)
+}
+
+/// Diagnoses a case with the `gib` command and scores it.
+pub fn diagnose(gib: &Path, case: &Case, files: &Files, folder: &Path) -> Score {
+    let (json, extended) = (folder.join("diagnosis.json"), folder.join("extended.json"));
+    let begin = Instant::now();
+    let run = Command::new(gib)
+        .arg("diagnose")
+        .arg("--machine")
+        .arg(&files.machine)
+        .arg("--recording")
+        .arg(&files.recording)
+        .arg("--holdout")
+        .arg(&files.holdout)
+        .arg("--json")
+        .arg(&json)
+        .arg("--machine-out")
+        .arg(&extended)
+        .output();
+    let seconds = begin.elapsed().as_secs_f64();
+    let parsed = std::fs::read_to_string(&json).ok().and_then(|t| serde_json::from_str::<Value>(&t).ok());
+    let Some(diagnosis) = parsed else {
+        let why = match run {
+            Ok(o) => {
+                format!("{}: {}", o.status, String::from_utf8_lossy(&o.stderr).lines().next().unwrap_or("no message"))
+            }
+            Err(e) => format!("{}: {e}", gib.display()),
+        };
+        return Score { failure: Some(why), seconds, ..judge(case, &Value::Null) };
+    };
+    let mut score = Score { seconds, ..judge(case, &diagnosis) };
+    // Only what the files can say is compared with what is true: outside effects have no true machine file.
+    if !matches!(case.kind, Kind::Outside(_)) {
+        let residual_of = |machine: &Path, name: &str| predict(gib, machine, &files.holdout, &folder.join(name));
+        let truth = residual_of(&files.truth_machine, "predicted_truth.csv");
+        let believed = residual_of(&files.machine, "predicted_belief.csv");
+        let after = if extended.exists() { residual_of(&extended, "predicted_extended.csv") } else { believed };
+        let over = |a: Option<f64>, b: Option<f64>| Some(a? / b?);
+        score.against_truth = over(after, truth);
+        score.to_gain = over(believed, truth);
+        score.truth_over_floor = truth.map(|t| t / case.rig.torque_floor());
+    }
+    score
+}
