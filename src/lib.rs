@@ -9,6 +9,7 @@
 //! | [`program`] | INA in the head of a part program: read, written, removed |
 //! | [`recording`] | what was measured: columns, units, CSV, Parquet |
 //! | [`machine`] | `machine.json`: belief and effects, the vocabulary of causes |
+//! | [`plant`] | one axis under its servo: simulation and prediction |
 //! | [`analysis`] | what can be read off a recording without a model: inspection, lost motion |
 //! | [`abi`] | the C surface: guard, types, one file a family; nothing but translation |
 
@@ -21,6 +22,7 @@ pub mod units;
 pub mod cycle;
 
 pub mod machine;
+pub mod plant;
 pub mod program;
 pub mod recording;
 

@@ -1,0 +1,3 @@
+//! Simulation: what an axis does, and what its motion says its motor must deliver.
+
+pub mod motion;

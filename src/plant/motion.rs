@@ -1,0 +1,283 @@
+//! Speed and acceleration from a measured position, without shifting it in time.
+//!
+//! A Butterworth low-pass of order n run forward and backward has the gain 1/(1 + (f/fc)²ⁿ) and no phase. Where the
+//! signal's spectrum falls as f⁻²ⁿ into a white noise floor and meets it at fc, this is Wiener's filter S/(S + N), the
+//! one of least mean-square error for the position and for every derivative of it. So fc is read from the spectrum: the
+//! frequency at which motion and noise are equal. (Wiener 1949; Gustafsson, *Determining the initial states in
+//! forward-backward filtering*, 1996.)
+
+use realfft::RealFftPlanner;
+use std::f64::consts::{PI, TAU};
+
+/// Motion of one axis at the rows of its recording, in load units (mm; degree for rotary).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    /// Position with the noise above the cut-off taken off.
+    pub position: Vec<f64>,
+    /// Per second.
+    pub velocity: Vec<f64>,
+    /// Per second squared.
+    pub acceleration: Vec<f64>,
+    /// Where motion and noise are equal, Hz.
+    pub cutoff_hz: f64,
+    /// RMS of what was taken off: what the position cannot tell.
+    pub resolution: f64,
+}
+
+/// Fewest rows from which an acceleration is estimated.
+pub const FEWEST_ROWS: usize = 16;
+
+impl Motion {
+    /// Motion of a whole stretch of rows: times strictly increasing, positions finite. Irregular times are resampled to
+    /// their mean period, filtered, and read back at the rows. `None` for fewer than [`FEWEST_ROWS`] rows.
+    #[must_use]
+    pub fn estimate(time_s: &[f64], position: &[f64]) -> Option<Motion> {
+        Self::with_cutoff(time_s, position, None)
+    }
+
+    /// The same with a given cut-off, for instance that of the whole recording for one short stretch of it.
+    #[must_use]
+    pub fn with_cutoff(time_s: &[f64], position: &[f64], cutoff_hz: Option<f64>) -> Option<Motion> {
+        let n = time_s.len();
+        if n < FEWEST_ROWS || position.len() != n {
+            return None;
+        }
+        let start = time_s[0];
+        let period = (time_s[n - 1] - start) / (n - 1) as f64;
+        let off_grid = |i: usize| ((time_s[i] - start) / period - i as f64).abs();
+        let regular = (0..n).all(|i| off_grid(i) < 0.02);
+        let grid: Vec<f64> = if regular { position.to_vec() } else { resample(time_s, position, period) };
+        let cutoff_hz = cutoff_hz.unwrap_or_else(|| noise_crossing_hz(&grid, period)).min(0.4 / period);
+        let [smooth, velocity, acceleration] = differentiate(&grid, period, cutoff_hz);
+        let back = |values: Vec<f64>| {
+            if regular { values } else { time_s.iter().map(|t| cubic_at(&values, (t - start) / period)).collect() }
+        };
+        let (smooth, velocity, acceleration) = (back(smooth), back(velocity), back(acceleration));
+        let square: f64 = position.iter().zip(&smooth).map(|(raw, s)| (raw - s) * (raw - s)).sum();
+        Some(Motion { position: smooth, velocity, acceleration, cutoff_hz, resolution: (square / n as f64).sqrt() })
+    }
+}
+
+/// Linear interpolation onto a regular grid of as many rows over the same time.
+fn resample(time_s: &[f64], values: &[f64], period: f64) -> Vec<f64> {
+    let mut row = 0;
+    (0..time_s.len())
+        .map(|i| {
+            let t = time_s[0] + i as f64 * period;
+            while row + 2 < time_s.len() && time_s[row + 1] < t {
+                row += 1;
+            }
+            let share = (t - time_s[row]) / (time_s[row + 1] - time_s[row]);
+            values[row] + share * (values[row + 1] - values[row])
+        })
+        .collect()
+}
+
+/// Value of a regular series at a fractional index, by Catmull and Rom's cubic; held at the ends.
+#[must_use]
+pub fn cubic_at(values: &[f64], index: f64) -> f64 {
+    let last = values.len().saturating_sub(1);
+    let index = index.clamp(0.0, last as f64);
+    let i = (index as usize).min(last.saturating_sub(1));
+    let at = |k: usize| values.get(k.min(last)).copied().unwrap_or(0.0);
+    let (a, b, c, d) = (at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2));
+    let t = index - i as f64;
+    b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+}
+
+/// Smoothed series and its first two derivatives.
+fn differentiate(values: &[f64], period: f64, cutoff_hz: f64) -> [Vec<f64>; 3] {
+    let n = values.len();
+    // Six periods of the cut-off: the filter has forgotten its start by then.
+    let pad = ((6.0 / (cutoff_hz * period)) as usize).clamp(4, n - 1);
+    let (first, last) = (values[0], values[n - 1]);
+    let before = (1..=pad).rev().map(|k| 2.0 * first - values[k]);
+    let after = (1..=pad).map(|k| 2.0 * last - values[n - 1 - k]);
+    let mut x: Vec<f64> = before.chain(values.iter().copied()).chain(after).collect();
+    for section in Section::butterworth4(cutoff_hz * period) {
+        section.run(&mut x);
+        x.reverse();
+        section.run(&mut x);
+        x.reverse();
+    }
+    let at = |i: usize, k: isize| x[(i + pad).saturating_add_signed(k)];
+    // Central differences of fourth order; the padding gives them neighbours at both ends.
+    let first = |i| (8.0 * (at(i, 1) - at(i, -1)) - (at(i, 2) - at(i, -2))) / (12.0 * period);
+    let second =
+        |i| (16.0 * (at(i, 1) + at(i, -1)) - (at(i, 2) + at(i, -2)) - 30.0 * at(i, 0)) / (12.0 * period * period);
+    [(0..n).map(|i| at(i, 0)).collect(), (0..n).map(first).collect(), (0..n).map(second).collect()]
+}
+
+/// Second-order low-pass section, unity gain at rest.
+struct Section {
+    b0: f64,
+    a1: f64,
+    a2: f64,
+}
+
+impl Section {
+    /// The two sections of a fourth-order Butterworth low-pass by the bilinear transform; `cutoff` in cycles per sample.
+    fn butterworth4(cutoff: f64) -> [Section; 2] {
+        let w = (PI * cutoff.clamp(1e-6, 0.49)).tan();
+        [PI / 8.0, 3.0 * PI / 8.0].map(|angle| {
+            let damping = 2.0 * angle.cos();
+            let norm = 1.0 / (1.0 + damping * w + w * w);
+            Section { b0: w * w * norm, a1: 2.0 * (w * w - 1.0) * norm, a2: (1.0 - damping * w + w * w) * norm }
+        })
+    }
+
+    /// Filters in place, as if the first value had stood for ever.
+    fn run(&self, values: &mut [f64]) {
+        let offset = values.first().copied().unwrap_or(0.0);
+        let (mut s1, mut s2) = (0.0, 0.0);
+        for value in values {
+            let x = *value - offset;
+            let y = self.b0 * x + s1;
+            s1 = 2.0 * self.b0 * x - self.a1 * y + s2;
+            s2 = self.b0 * x - self.a2 * y;
+            *value = y + offset;
+        }
+    }
+}
+
+/// Frequency at which the spectrum of motion has sunk to that of the position's white noise.
+#[must_use]
+pub fn noise_crossing_hz(position: &[f64], period: f64) -> f64 {
+    let rate = 1.0 / period;
+    let length = (position.len() / 4).clamp(FEWEST_ROWS, 2048) & !1;
+    let spectrum = position_spectrum(position, length);
+    let bins = spectrum.len();
+    let band = |low: f64, high: f64| {
+        let low = ((low * length as f64) as usize).min(bins - 1);
+        low..((high * length as f64).ceil() as usize).clamp(low + 1, bins)
+    };
+    let mut top: Vec<f64> = spectrum[band(0.35, 0.49)].to_vec();
+    let middle = top.len() / 2;
+    let noise = *top.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let lowest = 4.0 / length as f64;
+    let mut frequency = 0.25;
+    while frequency > lowest {
+        let neighbours = &spectrum[band(frequency / 1.12, frequency * 1.12)];
+        // Signal as large as the noise makes twice the noise; the rest is the scatter of the estimate.
+        if neighbours.iter().sum::<f64>() / neighbours.len() as f64 > 2.5 * noise {
+            break;
+        }
+        frequency /= 1.04;
+    }
+    frequency.max(lowest) * rate
+}
+
+/// Mean power of the position per bin, from its second difference, in which neither stroke nor drift leaks.
+fn position_spectrum(position: &[f64], length: usize) -> Vec<f64> {
+    let bend: Vec<f64> = position.windows(3).map(|w| w[2] - 2.0 * w[1] + w[0]).collect();
+    let mut planner = RealFftPlanner::<f64>::new();
+    let fft = planner.plan_fft_forward(length);
+    let (mut input, mut output) = (fft.make_input_vec(), fft.make_output_vec());
+    let mut power = vec![0.0; output.len()];
+    // Half overlapping, and no more than some hundred segments however long the recording is.
+    let hop = (length / 2).max(bend.len() / 256).max(1);
+    for start in (0..).step_by(hop).take_while(|start| start + length <= bend.len()) {
+        for (i, (slot, value)) in input.iter_mut().zip(&bend[start..]).enumerate() {
+            *slot = value * 0.5 * (1.0 - (TAU * i as f64 / length as f64).cos());
+        }
+        if fft.process(&mut input, &mut output).is_ok() {
+            power.iter_mut().zip(&output).for_each(|(sum, c)| *sum += c.norm_sqr());
+        }
+    }
+    for (i, value) in power.iter_mut().enumerate() {
+        let gain = 2.0 * (PI * i as f64 / length as f64).sin();
+        *value /= gain.powi(4).max(1e-18);
+    }
+    power
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Uniform noise of unit variance from a fixed start.
+    fn noise(n: usize) -> Vec<f64> {
+        let mut state = 88_172_645_463_325_252_u64;
+        let mut next = move || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        (0..n).map(|_| next() * 12f64.sqrt()).collect()
+    }
+
+    fn rms(values: impl Iterator<Item = f64>) -> f64 {
+        let (sum, n) = values.fold((0.0, 0), |(sum, n), v| (sum + v * v, n + 1));
+        (sum / f64::from(n)).sqrt()
+    }
+
+    #[test]
+    fn a_sine_keeps_phase_and_its_derivatives_are_exact_to_the_filter_s_gain() {
+        let (hz, n) = (3.0, 4000);
+        let time: Vec<f64> = (0..n).map(|i| f64::from(i) * 1e-3).collect();
+        let position: Vec<f64> = time.iter().map(|t| 50.0 * (TAU * hz * t).sin()).collect();
+        let motion = Motion::with_cutoff(&time, &position, Some(60.0)).unwrap();
+        let w = TAU * hz;
+        for i in 300..3700 {
+            let t = time[i];
+            assert!((motion.velocity[i] / (50.0 * w) - (w * t).cos()).abs() < 1e-4);
+            assert!((motion.acceleration[i] / (50.0 * w * w) + (w * t).sin()).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn half_the_amplitude_is_left_at_the_cutoff() {
+        let time: Vec<f64> = (0..4000).map(|i| f64::from(i) * 1e-3).collect();
+        let position: Vec<f64> = time.iter().map(|t| (TAU * 40.0 * t).sin()).collect();
+        let motion = Motion::with_cutoff(&time, &position, Some(40.0)).unwrap();
+        let left = motion.position[500..3500].iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        assert!((left - 0.5).abs() < 0.01, "{left}");
+    }
+
+    #[test]
+    fn irregular_rows_give_the_same_motion() {
+        let jitter = noise(5000);
+        let time: Vec<f64> = (0..5000).map(|i| (i as f64 + 0.2 * jitter[i]) * 1e-3).collect();
+        let position: Vec<f64> = time.iter().map(|t| 10.0 * (TAU * 1.5 * t).sin()).collect();
+        let motion = Motion::with_cutoff(&time, &position, Some(30.0)).unwrap();
+        let w = TAU * 1.5;
+        let error = rms((400..4600).map(|i| motion.acceleration[i] + 10.0 * w * w * (w * time[i]).sin()));
+        assert!(error < 0.01 * 10.0 * w * w, "{error}");
+    }
+
+    /// The cut-off found is close to the best one, on a motion whose acceleration is known and whatever the noise.
+    #[test]
+    fn the_cutoff_found_is_near_the_best() {
+        let n = 20_000;
+        let time: Vec<f64> = (0..n).map(|i| f64::from(i) * 1e-3).collect();
+        // Reversals with jerk steps: x⃛ is a square wave, so the spectrum falls as f⁻⁸.
+        let (mut x, mut v, mut a) = (0.0, 0.0, 0.0);
+        let (mut clean, mut truth) = (Vec::new(), Vec::new());
+        for i in 0..n {
+            let phase = i % 1000;
+            let jerk = if (250..750).contains(&phase) { -2e4 } else { 2e4 };
+            clean.push(x);
+            truth.push(a);
+            let h = 1e-3;
+            x += h * v + h * h / 2.0 * a + h * h * h / 6.0 * jerk;
+            v += h * a + h * h / 2.0 * jerk;
+            a += h * jerk;
+        }
+        for sigma in [1e-5, 1e-3, 1e-1] {
+            let noisy: Vec<f64> = clean.iter().zip(noise(20_000)).map(|(x, e)| x + sigma * e).collect();
+            let error = |cutoff| {
+                let motion = Motion::with_cutoff(&time, &noisy, cutoff).unwrap();
+                rms((1000..19_000).map(|i| motion.acceleration[i] - truth[i]))
+            };
+            let best = (0..40).map(|k| error(Some(2.0 * 1.13_f64.powi(k)))).fold(f64::INFINITY, f64::min);
+            let found = error(None);
+            assert!(found < 1.3 * best, "noise {sigma}: {found} against {best}");
+        }
+    }
+
+    #[test]
+    fn too_few_rows_are_refused() {
+        assert!(Motion::estimate(&[0.0; 3], &[0.0; 3]).is_none());
+    }
+}
