@@ -4,21 +4,12 @@
 //! run as a command on files. Build both, then run: `cargo build --release && cargo run --release --example scoreboard --
 //! --cases 64 --seed 1`.
 
-mod case;
-mod effects;
-mod integrate;
-mod moves;
-mod outside;
-mod random;
-mod record;
-mod rig;
-mod score;
-mod table;
-mod truth;
+mod board;
 
-use case::{Case, Kind};
+use board::case::{Case, Kind};
+use board::score::{self, Score};
+use board::{effects, outside, table};
 use clap::Parser;
-use score::Score;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Mutex;
@@ -48,6 +39,9 @@ struct Options {
     /// Cases at a time.
     #[arg(long, default_value_t = 2)]
     jobs: usize,
+    /// Longest recording, s (the shortest is 10 s).
+    #[arg(long, default_value_t = 60.0)]
+    longest: f64,
     /// Only make the files (with --keep), do not diagnose.
     #[arg(long)]
     generate: bool,
@@ -87,7 +81,7 @@ fn main() -> ExitCode {
         for _ in 0..options.jobs.max(1) {
             scope.spawn(|| {
                 while let Some(&index) = indices.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let case = Case::draw(seed, index, kind.unwrap_or_else(|| Kind::of(seed, index)));
+                    let case = Case::draw(seed, index, kind.unwrap_or_else(|| Kind::of(seed, index)), options.longest);
                     let folder = options.keep.as_deref().unwrap_or(scratch.path()).join(format!("case-{seed}-{index}"));
                     let score = run(&case, &folder, gib.as_deref().filter(|_| !options.generate));
                     println!("{}", line(index, &case, score.as_ref()));

@@ -1,9 +1,9 @@
 //! The causes of the vocabulary as the generator hides them: random parameters within what real machines show, how each
 //! changes the true machine, and the parameters under the keys of the files, against which a diagnosis is scored.
 
-use crate::random::Random;
-use crate::rig::{Drive, Rig};
-use crate::truth::{Coupling, Sine, Truth};
+use super::random::Random;
+use super::rig::{Drive, Rig};
+use super::truth::{Coupling, Sine, Truth};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 
@@ -277,5 +277,143 @@ impl Effect {
         let parameters: serde_json::Map<String, Value> =
             self.parameters(rig).into_iter().map(|p| (p.key, json!(p.value))).collect();
         json!({ "cause": self.cause, "parameters": parameters })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::{moves, record};
+
+    /// A rig of each drive, with a smooth servo and a scale, and a run of it.
+    fn bench(drive: Drive) -> (Rig, Vec<f64>) {
+        let fits = |r: &Rig| r.drive == drive && r.gearing != 36.0 && r.servo.period >= 1e-3;
+        let mut rig = (0..999).map(|s| Rig::draw(&mut Random::new(11, s), 10.0)).find(fits).unwrap();
+        rig.table = Some((1e-6, 0.0));
+        let (start, segments) = moves::draw(&mut Random::new(5, 5), &rig.reach, rig.duration, 0.3);
+        let command = moves::sample(start, &segments, rig.servo.period, rig.duration, 0.02);
+        (rig, command)
+    }
+
+    /// What the documentation of the files says each cause adds to the torque, from the true motion alone.
+    fn promised(effect: &Effect, rig: &Rig, t: f64, x: f64, v: f64, a: f64) -> Option<f64> {
+        let value = |key: &str| {
+            effect.parameters(rig).iter().find(|p| p.key == rig.key(key)).map(|p| p.value).unwrap_or(f64::NAN)
+        };
+        let (w, alpha, way) = (v / rig.unit, a / rig.unit, v.signum());
+        Some(match effect.cause {
+            "inertia_mismatch" => (value("inertia_kg_m2") - rig.inertia) * alpha,
+            "coulomb_friction_mismatch" => (value("coulomb_friction_nm") - rig.coulomb) * way,
+            "viscous_friction_mismatch" => (value("viscous_friction_nm_s") - rig.viscous) * w,
+            "constant_torque" => value("constant_torque_nm") - rig.constant,
+            "direction_dependent_friction" => value("asymmetry_nm_s") * w.abs(),
+            "stribeck_friction" => {
+                way * value("stribeck_torque_nm") * (-(v / value("stribeck_velocity_mm_s")).powi(2)).exp()
+            }
+            "cogging" => value("amplitude_nm") * (TAU * x / value("period_mm") + effect.form[1]).sin(),
+            "position_dependent_friction" => {
+                way * value("peak_nm") * (-((x - value("centre_mm")) / value("width_mm")).powi(2)).exp()
+            }
+            "cable_force" => value("slope_nm_mm") * (x - value("zero_mm")),
+            "quadratic_drag" => value("drag_nm_s2_m2") * v * v.abs() * 1e-6,
+            "thermal_drift" => way * value("drop_nm") * (-t / value("time_constant_s")).exp(),
+            "external_vibration" => value("amplitude_nm") * (TAU * value("frequency_hz") * t + effect.form[1]).sin(),
+            _ => return None,
+        })
+    }
+
+    #[test]
+    fn each_torque_is_in_the_recording_as_the_files_describe_it() {
+        let mut checked = 0;
+        for drive in [Drive::BallScrew, Drive::Linear, Drive::Rotary] {
+            let (rig, command) = bench(drive);
+            for cause in CAUSES.into_iter().filter(|c| possible(c, &rig)) {
+                let mut effect = Effect::draw(cause, &rig, 1.0, &mut Random::new(2, checked as u64));
+                effect.amount = (effect.low * effect.high).sqrt();
+                let mut truth = Truth::of(&rig);
+                effect.apply(&rig, &mut truth);
+                let r = record::run(&rig, &truth, &command, 2e-5, &mut Random::new(1, 1));
+                let (h, x) = (rig.servo.period, &r.true_position);
+                let (mut apart, mut scale) = (Vec::new(), Vec::new());
+                for i in 2..x.len() - 2 {
+                    let v = (x[i + 1] - x[i - 1]) / (2.0 * h);
+                    let a = (x[i + 1] - 2.0 * x[i] + x[i - 1]) / (h * h);
+                    // Away from reversals, where the sign of the motion is plain and differences are good.
+                    let slow = (i - 2..=i + 2)
+                        .any(|j| (x[j] - x[i]).abs() > 0.0 && (x[j] - x[i]) * (j as f64 - i as f64) * v < 0.0);
+                    if v.abs() < 1e-3 * rig.reach.speed || slow {
+                        continue;
+                    }
+                    let Some(expected) = promised(&effect, &rig, i as f64 * h, x[i], v, a) else { continue };
+                    apart.push(r.unexplained[i] - expected);
+                    scale.push(expected);
+                }
+                if scale.is_empty() {
+                    continue;
+                }
+                let (error, size) = (record::rms(&apart), record::rms(&scale));
+                // Accelerations from differences over a cycle in which the torque jumps are the coarse ones.
+                let allowed = if cause == "inertia_mismatch" { 0.2 } else { 0.02 };
+                assert!(error < allowed * size, "{drive:?} {cause}: {error} of {size}");
+                checked += 1;
+            }
+        }
+        assert!(checked >= 33, "only {checked} checked");
+    }
+
+    #[test]
+    fn a_clearance_is_lost_at_a_reversal_as_wide_as_it_says() {
+        let (mut rig, _) = bench(Drive::BallScrew);
+        rig.table = Some((1e-6, 0.0));
+        let effect = Effect { amount: 0.04, ..Effect::draw("backlash", &rig, 1.0, &mut Random::new(2, 2)) };
+        let mut truth = Truth::of(&rig);
+        effect.apply(&rig, &mut truth);
+        let speed = 0.02 * rig.reach.speed;
+        let travel = 2.0 * speed;
+        let there = [
+            moves::Segment::Move { to: 20.0 + travel, speed, acceleration: 0.2 * rig.reach.acceleration },
+            moves::Segment::Move { to: 20.0, speed, acceleration: 0.2 * rig.reach.acceleration },
+        ];
+        let command = moves::sample(20.0, &there, rig.servo.period, 4.0, 0.0);
+        let r = record::run(&rig, &truth, &command, 1e-5, &mut Random::new(1, 1));
+        let at = |t: f64| r.table_error[(t / rig.servo.period) as usize];
+        // Sliding one way the table lags by half the clearance, the other way it leads; wind-up of the flanks is far less.
+        let lost = at(3.0) - at(1.5);
+        assert!((lost - 0.04).abs() < 0.001, "{lost}");
+    }
+
+    #[test]
+    fn stiffness_and_resonance_belong_together() {
+        let (rig, _) = bench(Drive::BallScrew);
+        let effect =
+            Effect { amount: 1.0 / 2500.0, ..Effect::draw("drive_compliance", &rig, 1.0, &mut Random::new(3, 3)) };
+        let p = effect.parameters(&rig);
+        assert!((p[0].value - 50.0).abs() < 1e-9, "{} Hz", p[0].value);
+        // Masses at the table: J/(lead/2π)²; f = √(k(1/m₁ + 1/m₂))/2π.
+        let radius = rig.gearing * 1e-3 / TAU;
+        let (m1, m2) =
+            (rig.inertia * (1.0 - effect.form[0]) / radius.powi(2), rig.inertia * effect.form[0] / radius.powi(2));
+        let hz = (p[1].value * 1e6 * (1.0 / m1 + 1.0 / m2)).sqrt() / TAU;
+        assert!((hz - 50.0).abs() < 1e-9, "{hz} Hz from {} N/µm", p[1].value);
+    }
+
+    #[test]
+    fn what_is_beyond_saturation_is_in_the_current_and_not_in_the_motion() {
+        let (rig, command) = bench(Drive::Linear);
+        let plain = record::run(&rig, &Truth::of(&rig), &command, 2e-5, &mut Random::new(1, 1));
+        let peak = plain.clean_torque.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+        let mut effect = Effect::draw("torque_saturation", &rig, peak, &mut Random::new(1, 1));
+        effect.amount = 0.3 * peak;
+        effect.form[0] = 0.5;
+        let mut truth = Truth::of(&rig);
+        effect.apply(&rig, &mut truth);
+        let r = record::run(&rig, &truth, &command, 2e-5, &mut Random::new(1, 1));
+        let mut beyond = 0;
+        for (torque, left) in r.clean_torque.iter().zip(&r.unexplained) {
+            let excess = 0.5 * (torque.abs() - 0.7 * peak).max(0.0) * torque.signum();
+            assert!((left - excess).abs() < 1e-6 * peak, "{left} for {excess}");
+            beyond += usize::from(excess != 0.0);
+        }
+        assert!(beyond > 20, "{beyond} rows");
     }
 }

@@ -4,10 +4,10 @@
 //! cycle), then v = (x[i] − x[i−1])/Ts (or of the mean of two samples), e = Kp·(command − x) + ff·dcommand/dt − v,
 //! u = Kv·(e + I) within the limit, I += e·Ts/Ti unless limited; u is held for the cycle.
 
-use crate::integrate::Machine;
-use crate::random::Random;
-use crate::rig::{Rig, ServoGains};
-use crate::truth::Truth;
+use super::integrate::Machine;
+use super::random::Random;
+use super::rig::{Rig, ServoGains};
+use super::truth::Truth;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
@@ -125,10 +125,9 @@ pub fn run(rig: &Rig, truth: &Truth, command: &[f64], step: f64, noise: &mut Ran
     }
     // caught[i] is of step `catch` of cycle i; the torque of row i − delay is that of cycle i − rows_late − (phase > 0).
     let back = rows_late + i64::from(phase > 0);
-    for i in 0..rows {
+    for (i, &(without_dry, sign)) in believed.iter().enumerate() {
         let from = (i as i64 - back).clamp(0, rows as i64 - 1) as usize;
         out.clean_torque.push(caught[from]);
-        let (without_dry, sign) = believed[i];
         let rest = caught[from] - without_dry;
         // At rest friction takes any value up to its level: only what is beyond that is unexplained.
         let left = if sign == 0.0 { rest - rest.clamp(-rig.coulomb, rig.coulomb) } else { rest - sign * rig.coulomb };
@@ -166,12 +165,10 @@ pub fn rms(values: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::moves;
+    use crate::board::moves;
 
     fn rig(seed: u64) -> Rig {
-        let mut rig = Rig::draw(&mut Random::new(seed, 9));
-        rig.duration = 10.0;
-        rig
+        Rig::draw(&mut Random::new(seed, 9), 10.0)
     }
 
     fn command(rig: &Rig) -> Vec<f64> {

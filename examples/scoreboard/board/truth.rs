@@ -6,8 +6,8 @@
 //!
 //! with F = Tc ± direction + Ts·exp(−(v/vs)²) + spot(x) + drop·exp(−t/τ), never below a twentieth of Tc.
 
-use crate::outside::Outside;
-use crate::rig::Rig;
+use super::outside::Outside;
+use super::rig::Rig;
 use std::f64::consts::TAU;
 
 /// Amplitude, wavelength (load units) or frequency (Hz), phase (rad).

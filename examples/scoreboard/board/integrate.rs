@@ -9,7 +9,7 @@
 //! With presliding it is Dahl's law solved in closed form over the displacement of a step, f = s·F − (s·F − f₀)·e^(−|Δq|/d),
 //! with LuGre's bristle damping σ₁·ż. The current loop's first-order lag is exact.
 
-use crate::truth::{Coupling, Truth};
+use super::truth::{Coupling, Truth};
 
 /// State of the machine: index 0 is the motor, 1 the table (rigid machine: unused).
 #[derive(Clone, Copy, Debug)]
@@ -200,12 +200,12 @@ impl<'a> Machine<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
-    use crate::rig::Rig;
+    use crate::board::random::Random;
+    use crate::board::rig::Rig;
 
     /// A plain machine: 2 kg·m², no friction, nothing hidden.
     fn bare() -> Truth {
-        let rig = Rig::draw(&mut Random::new(1, 1));
+        let rig = Rig::draw(&mut Random::new(1, 1), 10.0);
         Truth { inertia: 2.0, coulomb: 0.0, viscous: 0.0, constant: 0.0, ..Truth::of(&rig) }
     }
 

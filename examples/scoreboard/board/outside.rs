@@ -1,7 +1,7 @@
 //! Effects that have no name in the vocabulary of causes: a diagnosis must say "unknown" and not press one into a name.
 
-use crate::random::Random;
-use crate::rig::Rig;
+use super::random::Random;
+use super::rig::Rig;
 
 /// How an effect outside the vocabulary acts. Torques are for a magnitude of 1 and are scaled by it.
 #[derive(Clone, Debug)]

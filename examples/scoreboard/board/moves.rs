@@ -3,7 +3,7 @@
 //! A move is a trapezoid of speed (or a triangle, when the way is too short for the speed); a moving average over a fixed
 //! time turns the trapezoids into S-curves of bounded jerk. Positions are in the load's unit (mm or deg), times in s.
 
-use crate::random::Random;
+use super::random::Random;
 
 /// What the axis can do, in load units.
 #[derive(Clone, Copy, Debug)]

@@ -1,8 +1,8 @@
 //! Runs the `gib` command on a case as a user would, and scores what it says against the truth.
 
-use crate::case::{Case, Files, Kind};
-use crate::effects::Effect;
-use crate::rig::Rig;
+use super::case::{Case, Files, Kind};
+use super::effects::Effect;
+use super::rig::Rig;
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
@@ -165,4 +165,41 @@ pub fn diagnose(gib: &Path, case: &Case, files: &Files, folder: &Path) -> Score 
         score.truth_over_floor = truth.map(|t| t / case.rig.torque_floor());
     }
     score
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    /// Says the truth, with every parameter off by `off` and a standard error of `std`, both relative.
+    fn said(case: &Case, off: f64, std: f64) -> Value {
+        let finding = |e: &Effect| {
+            let parameters: serde_json::Map<String, Value> = (e.parameters(&case.rig).into_iter())
+                .map(|p| (p.key, json!({ "value": p.value + off * p.scale, "std": std * p.scale })))
+                .collect();
+            json!({ "cause": e.cause, "parameters": parameters, "indistinguishable_from": [] })
+        };
+        json!({ "verdict": "explained", "findings": case.effects.iter().map(finding).collect::<Vec<_>>() })
+    }
+
+    #[test]
+    fn an_oracle_scores_full_marks_and_a_liar_none() {
+        let case = Case::draw(3, 0, Kind::One("stribeck_friction"), 11.0);
+        let right = judge(&case, &said(&case, 0.01, 0.006));
+        assert!(right.first_right && right.found == 1 && right.wrong == 0 && !right.tied);
+        assert_eq!(right.parameters.len(), 2);
+        assert!(right.parameters.iter().all(|p| p.covered && (p.error.unwrap() - 0.01).abs() < 1e-9));
+        // Too sure of itself.
+        assert!(judge(&case, &said(&case, 0.01, 0.005)).parameters.iter().all(|p| !p.covered));
+
+        let other = json!({ "verdict": "explained", "findings": [
+            { "cause": "backlash", "parameters": {}, "indistinguishable_from": ["stribeck_friction"] },
+            { "cause": "stribeck_friction", "parameters": {}, "indistinguishable_from": [] } ] });
+        let wrong = judge(&case, &other);
+        assert!(!wrong.first_right && wrong.tied && wrong.found == 1 && wrong.wrong == 1);
+        assert!(wrong.parameters.iter().all(|p| p.error.is_none() && !p.covered), "missing keys are errors");
+        let silent = judge(&case, &json!({ "verdict": "no_discrepancy", "findings": [] }));
+        assert!(!silent.first_right && silent.found == 0 && silent.verdict == "no_discrepancy");
+    }
 }

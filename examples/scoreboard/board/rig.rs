@@ -4,8 +4,8 @@
 //! Motor coordinates throughout: angle q in rad and torque in N·m (ball screw, rotary), or travel in m and force in N
 //! (linear). `unit` load units (mm; deg for rotary) are one unit of q.
 
-use crate::moves::Reach;
-use crate::random::Random;
+use super::moves::Reach;
+use super::random::Random;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 
@@ -59,7 +59,8 @@ pub struct Rig {
 }
 
 impl Rig {
-    pub fn draw(random: &mut Random) -> Self {
+    /// Draws one whose recordings last 10 s to `longest` s.
+    pub fn draw(random: &mut Random, longest: f64) -> Self {
         let drive = random.pick(&[Drive::BallScrew, Drive::BallScrew, Drive::Linear, Drive::Rotary]);
         let (gearing, unit) = match drive {
             Drive::BallScrew => {
@@ -138,7 +139,7 @@ impl Rig {
             table,
             reach: Reach { low, high: low + stroke, speed, acceleration },
             smoothing: if random.chance(0.5) { 0.0 } else { random.uniform(0.005, 0.04) },
-            duration: random.log_uniform(10.0, 60.0),
+            duration: random.log_uniform(10.0, longest),
         }
     }
 
@@ -225,7 +226,7 @@ mod tests {
     #[test]
     fn drawn_rigs_are_machines_that_can_run() {
         for stream in 0..500 {
-            let r = Rig::draw(&mut Random::new(3, stream));
+            let r = Rig::draw(&mut Random::new(3, stream), 60.0);
             let loop_gain = r.servo.velocity_gain / r.inertia * (r.servo.period + r.servo.lag);
             assert!(loop_gain < 0.4, "stream {stream}: velocity loop {loop_gain}");
             assert!(r.servo.position_gain < 0.35 * r.servo.velocity_gain / r.inertia);
@@ -237,7 +238,8 @@ mod tests {
 
     #[test]
     fn one_motor_turn_of_a_ball_screw_is_its_lead() {
-        let rig = (0..99).map(|s| Rig::draw(&mut Random::new(1, s))).find(|r| r.drive == Drive::BallScrew).unwrap();
+        let rig =
+            (0..99).map(|s| Rig::draw(&mut Random::new(1, s), 60.0)).find(|r| r.drive == Drive::BallScrew).unwrap();
         assert!((rig.unit * TAU - rig.gearing).abs() < 1e-12);
     }
 }

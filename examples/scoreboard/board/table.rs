@@ -1,6 +1,6 @@
 //! The scoreboard: who was named for whom, and the figures that sum it up.
 
-use crate::score::Score;
+use super::score::Score;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -144,4 +144,53 @@ pub fn print(scores: &[Score]) -> String {
         let _ = writeln!(out, "{what:<42} {value:<24} {wanted}");
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::score::ParameterScore;
+
+    fn score(truth: &[&str], named: &[&str], verdict: &str) -> Score {
+        let is_hidden = |n: &&&str| truth.contains(n);
+        Score {
+            truth: truth.iter().map(|s| s.to_string()).collect(),
+            named: named.iter().map(|s| s.to_string()).collect(),
+            verdict: verdict.into(),
+            first_right: named.first().is_some_and(|n| truth.contains(n)),
+            found: named.iter().filter(is_hidden).count(),
+            wrong: named.iter().filter(|n| !truth.contains(n)).count(),
+            ..Score::default()
+        }
+    }
+
+    #[test]
+    fn every_kind_of_case_is_counted_in_its_own_share() {
+        let mut hit = score(&["cogging"], &["cogging", "backlash"], "explained");
+        hit.parameters = [(0.01, true), (0.05, false), (0.02, true)]
+            .map(|(e, covered)| ParameterScore { cause: "cogging".into(), key: "k".into(), error: Some(e), covered })
+            .to_vec();
+        hit.against_truth = Some(1.05);
+        let scores = [
+            hit,
+            score(&["cogging"], &["backlash"], "explained"),
+            score(&["cogging", "backlash"], &["backlash", "cogging"], "explained"),
+            score(&["cogging", "backlash"], &["backlash"], "explained"),
+            score(&[], &[], "no_discrepancy"),
+            score(&[], &["cogging"], "explained"),
+            score(&[], &[], "unknown_cause"),
+            score(&["outside: detent"], &[], "unknown_cause"),
+            score(&["outside: detent"], &["cogging"], "partly_explained"),
+        ];
+        let s = summarise(&scores);
+        assert_eq!(s.first_right, (3, 4));
+        assert_eq!(s.wrong_beside, (1, 4));
+        assert_eq!(s.false_alarms, (2, 3));
+        assert_eq!(s.unknown, (1, 2));
+        assert_eq!(s.both_of_two, (1, 2));
+        assert_eq!(s.parameter_error, Some(0.02));
+        assert_eq!(s.covered, (2, 3));
+        assert_eq!(s.against_truth, Some(1.05));
+        assert!(print(&scores).contains("cogging"));
+    }
 }

@@ -5,13 +5,13 @@
 //! is faster than the encoder resolves could hide there, a case must also be visible: run with and without the effect,
 //! the logged torque or position must differ by as much against what sensor noise and a shift of the encoder's grid make.
 
-use crate::effects::{self, Effect};
-use crate::moves;
-use crate::outside::{self, Outside};
-use crate::random::Random;
-use crate::record::{self, Recording};
-use crate::rig::Rig;
-use crate::truth::Truth;
+use super::effects::{self, Effect};
+use super::moves;
+use super::outside::{self, Outside};
+use super::random::Random;
+use super::record::{self, Recording};
+use super::rig::Rig;
+use super::truth::Truth;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -98,8 +98,8 @@ fn apart(a: &[f64], b: &[f64], offset: f64) -> f64 {
 }
 
 impl Bench {
-    fn draw(kind: Kind, random: &mut Random) -> Option<Self> {
-        let mut rig = Rig::draw(random);
+    fn draw(kind: Kind, longest: f64, random: &mut Random) -> Option<Self> {
+        let mut rig = Rig::draw(random, longest);
         if let Kind::One(cause) = kind {
             if !effects::possible(cause, &rig) {
                 return None;
@@ -191,11 +191,11 @@ fn size_of(rig: &Rig, r: &Recording, cause: &str) -> f64 {
 }
 
 impl Case {
-    /// Draws case `index` of a seed. The same seed and index give the same files on every machine.
-    pub fn draw(seed: u64, index: usize, kind: Kind) -> Self {
+    /// Draws case `index` of a seed, with recordings of 10 s to `longest` s. The same seed and index give the same files on every machine.
+    pub fn draw(seed: u64, index: usize, kind: Kind, longest: f64) -> Self {
         for draws in 1.. {
             let mut random = Random::new(seed, (index as u64) << 20 | draws);
-            if let Some(case) = Self::attempt(kind, &mut random, draws as usize) {
+            if let Some(case) = Self::attempt(kind, longest, &mut random, draws as usize) {
                 return case;
             }
             assert!(draws < 400, "seed {seed}, case {index}: no rig shows {kind:?}");
@@ -203,8 +203,8 @@ impl Case {
         unreachable!()
     }
 
-    fn attempt(kind: Kind, random: &mut Random, draws: usize) -> Option<Self> {
-        let mut bench = Bench::draw(kind, random)?;
+    fn attempt(kind: Kind, longest: f64, random: &mut Random, draws: usize) -> Option<Self> {
+        let mut bench = Bench::draw(kind, longest, random)?;
         let mut hidden = Vec::new();
         let mut sizes = Vec::new();
         let mut outside = None;
