@@ -1,8 +1,9 @@
 //! A writer of a part program that is killed at any system call leaves the old program or the new one, whole.
 //!
 //! Each run traces `gib program …` with ptrace, which stops it before and after every system call, and kills it at one
-//! of these stops; run after run, at every stop there is. A second law is read off the same trace: the new program is
-//! on the disk before it gets its name, and the name before the command says done.
+//! of these stops; run after run, at every stop there is. Two more laws are tested on the same trace: the new program
+//! is on the disk before it gets its name, and the name before the command says done; and what an editor saves while
+//! gib is at work is not lost.
 #![cfg(target_os = "linux")]
 
 use std::fs;
@@ -212,4 +213,82 @@ fn the_new_program_is_on_the_disk_before_its_name_and_the_name_before_the_end() 
     fs::write(&side, &old).unwrap();
     let order_of_mv = order(Command::new("mv").arg(&side).arg(&shaft), &shaft);
     assert!(order_of_mv.contains('r') && !order_of_mv.contains('s') && !order_of_mv.contains('d'), "{order_of_mv}");
+}
+
+/// Runs `gib program set` while an editor, which knows no lock, saves the program whenever gib has just written its own.
+fn set_while_edited(program: &Path, mut save: impl FnMut(u32)) -> u32 {
+    let mut saved = 0;
+    let ended = traced(&mut gib("set 0.7", program), |stop| {
+        if stop.entry && stop.call == libc::SYS_fsync && stop.file().is_file() {
+            saved += 1;
+            save(saved);
+        }
+        true
+    });
+    assert!(ended);
+    saved
+}
+
+#[test]
+fn what_an_editor_saves_meanwhile_is_not_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let shaft = folder.path().join("shaft.nc");
+    let (edited, edited_and_set) = (program("(EDITED)\n"), program("(INA=0.7)\n(EDITED)\n"));
+    let replaced = |_: &Path| {
+        let save = folder.path().join("save");
+        fs::write(&save, &edited).unwrap();
+        fs::rename(&save, &shaft).unwrap();
+    };
+    let in_place = |_: &Path| fs::write(&shaft, &edited).unwrap();
+    for save in [&replaced as &dyn Fn(&Path), &in_place] {
+        fs::write(&shaft, program("")).unwrap();
+        let rounds = set_while_edited(&shaft, |round| {
+            if round == 1 {
+                save(&shaft)
+            }
+        });
+        assert_eq!(rounds, 2, "once for nothing, once with what the editor saved");
+        assert!(fs::read(&shaft).unwrap() == edited_and_set);
+    }
+}
+
+#[test]
+fn a_program_that_changes_all_the_time_is_given_up_unharmed() {
+    let folder = tempfile::tempdir().unwrap();
+    let shaft = folder.path().join("shaft.nc");
+    fs::write(&shaft, program("")).unwrap();
+    let rounds = set_while_edited(&shaft, |round| fs::write(&shaft, format!("({round})\nM30\n")).unwrap());
+    assert_eq!(fs::read_to_string(&shaft).unwrap(), format!("({rounds})\nM30\n"));
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing left beside it");
+}
+
+/// The narrow moment of the lock: between opening the file beside and locking it, another writer has made it the
+/// program, and a third has begun anew under its name.
+#[test]
+fn a_lock_on_what_no_longer_bears_the_name_is_no_lock() {
+    let folder = tempfile::tempdir().unwrap();
+    let (shaft, side) = (folder.path().join("shaft.nc"), folder.path().join(".shaft.nc.gib"));
+    fs::write(&shaft, program("")).unwrap();
+    fs::write(&side, program("(INA2=0.2)\n")).unwrap();
+    let (mut third, mut waits) = (None, 0);
+    let ended = traced(&mut gib("set 0.7", &shaft), |stop| {
+        if stop.entry && stop.call == libc::SYS_flock && waits == 0 && third.is_none() {
+            fs::rename(&side, &shaft).unwrap();
+            fs::write(&side, program("(INA2=0.2)\n(INA3=0.3)\n")).unwrap();
+            let file = fs::File::open(&side).unwrap();
+            rustix::fs::flock(&file, rustix::fs::FlockOperation::LockExclusive).unwrap();
+            third = Some(file);
+        }
+        if stop.entry && stop.call == libc::SYS_clock_nanosleep {
+            waits += 1;
+            if waits == 3 {
+                fs::rename(&side, &shaft).unwrap();
+                third = None;
+            }
+        }
+        true
+    });
+    assert!(ended && waits >= 3, "waited {waits} times");
+    assert!(fs::read(&shaft).unwrap() == program("(INA=0.7)\n(INA2=0.2)\n(INA3=0.3)\n"));
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
