@@ -1,5 +1,87 @@
-CARGO ?= cargo
+# gib: build, show, test, install. `make` builds; `make help` lists the rest.
+#
+# Set on the command line as usual: PREFIX, DESTDIR, LIBDIR, INCLUDEDIR, BINDIR, CC, CARGO.
 
-.PHONY: header
+CARGO ?= cargo
+PREFIX ?= /usr/local
+LIBDIR ?= $(PREFIX)/lib
+INCLUDEDIR ?= $(PREFIX)/include
+BINDIR ?= $(PREFIX)/bin
+DOCDIR ?= $(PREFIX)/share/doc/gib
+INSTALL ?= install
+
+VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
+TARGET := $(or $(CARGO_TARGET_DIR),target)
+RELEASE := $(TARGET)/release
+# What a C program outside the tree would find installed: the libraries with their links.
+LIB := build/lib
+
+.PHONY: all build header demo test deps check-format check-lints test-rust test-harness bench install uninstall clean help
+
+all: build
+
+build: ## the libraries (build/lib) and the command (target/release/gib)
+	$(CARGO) build --release
+	@mkdir -p $(LIB)
+	@objcopy --strip-debug $(RELEASE)/libgib.so $(LIB)/libgib.so.$(VERSION)
+	@ln -sf libgib.so.$(VERSION) $(LIB)/libgib.so.0
+	@ln -sf libgib.so.0 $(LIB)/libgib.so
+	@tools/static-archive $(RELEASE)/libgib.a $(RELEASE)/libgib.so $(LIB)/libgib.a
+
 header: ## write include/gib.h from the Rust sources
 	GIB_BLESS=1 $(CARGO) test -q --test header committed_header_is_fresh
+
+demo: build ## show what gib does
+	@test ! -e c-harness/Makefile || $(MAKE) -s -C c-harness all
+	@GIB=$(RELEASE)/gib tools/demo
+
+test: deps check-format build check-lints test-rust test-harness ## everything that must hold
+	@echo "make test: all passed"
+
+deps: ## install the Debian packages that the tests need
+	@tools/deps
+
+check-format:
+	$(CARGO) fmt --check
+
+check-lints:
+	$(CARGO) clippy -q --all-targets -- -D warnings
+
+test-rust:
+	GIB_RELEASE=$(RELEASE) $(CARGO) test
+
+test-harness:
+	@if [ -e c-harness/Makefile ]; then $(MAKE) -C c-harness test; else echo "test-harness: skipped, no c-harness/Makefile"; fi
+
+bench: build ## instructions per step, printed
+	@if [ -e c-harness/Makefile ]; then $(MAKE) -C c-harness bench; else echo "bench: skipped, no c-harness/Makefile"; fi
+
+install: build ## into $(DESTDIR)$(PREFIX)
+	$(INSTALL) -d $(addprefix $(DESTDIR),$(INCLUDEDIR) $(LIBDIR)/pkgconfig $(BINDIR) $(DOCDIR))
+	$(INSTALL) -m 644 include/gib.h $(DESTDIR)$(INCLUDEDIR)/gib.h
+	$(INSTALL) -m 755 $(LIB)/libgib.so.$(VERSION) $(DESTDIR)$(LIBDIR)/libgib.so.$(VERSION)
+	ln -sf libgib.so.$(VERSION) $(DESTDIR)$(LIBDIR)/libgib.so.0
+	ln -sf libgib.so.0 $(DESTDIR)$(LIBDIR)/libgib.so
+	$(INSTALL) -m 644 $(LIB)/libgib.a $(DESTDIR)$(LIBDIR)/libgib.a
+	sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|; s|@INCLUDEDIR@|$(INCLUDEDIR)|; s|@VERSION@|$(VERSION)|' \
+	    tools/gib.pc.in > $(DESTDIR)$(LIBDIR)/pkgconfig/gib.pc
+	$(INSTALL) -m 755 $(RELEASE)/gib $(DESTDIR)$(BINDIR)/gib
+	$(INSTALL) -m 644 $(DOCS) $(DESTDIR)$(DOCDIR)
+	@test -n "$(DESTDIR)" || ldconfig 2>/dev/null || true
+
+DOCS := $(wildcard README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE)
+
+uninstall: ## remove exactly what install wrote
+	rm -f $(DESTDIR)$(INCLUDEDIR)/gib.h $(DESTDIR)$(LIBDIR)/pkgconfig/gib.pc $(DESTDIR)$(BINDIR)/gib
+	rm -f $(addprefix $(DESTDIR)$(LIBDIR)/,libgib.so.$(VERSION) libgib.so.0 libgib.so libgib.a)
+	rm -f $(addprefix $(DESTDIR)$(DOCDIR)/,$(DOCS))
+	@test ! -d $(DESTDIR)$(DOCDIR) || rmdir --ignore-fail-on-non-empty $(DESTDIR)$(DOCDIR)
+	@test -n "$(DESTDIR)" || ldconfig 2>/dev/null || true
+
+clean: ## remove everything that make builds
+	$(CARGO) clean
+	rm -rf build
+	@test ! -e c-harness/Makefile || $(MAKE) -s -C c-harness clean
+
+help: ## this list
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|'
