@@ -20,13 +20,16 @@ LIB := build/lib
 
 all: build
 
-build: ## the libraries (build/lib) and the command (target/release/gib)
+build: $(LIB)/libgib.a ## the libraries (build/lib) and the command (target/release/gib)
+
+# Remade when a source changed, so that `sudo make install` after `make` needs no cargo.
+$(LIB)/libgib.a: Cargo.toml Cargo.lock build.rs tools/static-archive $(shell find src -name '*.rs')
 	$(CARGO) build --release
 	@mkdir -p $(LIB)
 	@objcopy --strip-debug $(RELEASE)/libgib.so $(LIB)/libgib.so.$(VERSION)
 	@ln -sf libgib.so.$(VERSION) $(LIB)/libgib.so.0
 	@ln -sf libgib.so.0 $(LIB)/libgib.so
-	@tools/static-archive $(RELEASE)/libgib.a $(RELEASE)/libgib.so $(LIB)/libgib.a
+	@tools/static-archive $(RELEASE)/libgib.a $(RELEASE)/libgib.so $@
 
 header: ## write include/gib.h from the Rust sources
 	GIB_BLESS=1 $(CARGO) test -q --test header committed_header_is_fresh
