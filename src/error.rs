@@ -50,6 +50,8 @@ pub const GIB_ERR_IO: i32 = -18;
 pub const GIB_ERR_FORMAT: i32 = -19;
 /// This library cannot serve the ABI version asked for.
 pub const GIB_ERR_VERSION: i32 = -20;
+/// The axis does not follow its command: following error beyond the limit, or an encoder that stands still.
+pub const GIB_ERR_LAG: i32 = -21;
 
 /// The torque never rose after the reversal: no end of the lost motion was seen.
 pub const GIB_ERR_BACKLASH_NO_RISE: i32 = -100;
@@ -65,6 +67,8 @@ pub const GIB_ERR_BACKLASH_RESOLUTION: i32 = -104;
 pub const GIB_ERR_BACKLASH_SHAPE: i32 = -105;
 /// The share of friction on the motor side could not be told from the wind-up.
 pub const GIB_ERR_BACKLASH_MOTOR_FRICTION: i32 = -106;
+/// The torque falls where it should rise: its sign does not agree with the position's.
+pub const GIB_ERR_BACKLASH_TORQUE_SIGN: i32 = -107;
 
 /// Every status and the sentence that explains it.
 const TEXTS: &[(i32, &str)] = &[
@@ -91,6 +95,7 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_IO, "a file could not be read or written\0"),
     (GIB_ERR_FORMAT, "the text does not have the expected format\0"),
     (GIB_ERR_VERSION, "this library cannot serve that ABI version\0"),
+    (GIB_ERR_LAG, "the axis does not follow its command\0"),
     (GIB_ERR_BACKLASH_NO_RISE, "the torque never rose after the reversal\0"),
     (GIB_ERR_BACKLASH_LIMIT, "the detection limit was reached before the table broke away\0"),
     (GIB_ERR_BACKLASH_NOISE, "the stiffness line is lost in the torque noise\0"),
@@ -98,6 +103,7 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_BACKLASH_RESOLUTION, "the lost motion is below what encoder and noise resolve\0"),
     (GIB_ERR_BACKLASH_SHAPE, "the torque curve is not a release, a clearance and a wind-up\0"),
     (GIB_ERR_BACKLASH_MOTOR_FRICTION, "motor-side friction could not be told from the wind-up\0"),
+    (GIB_ERR_BACKLASH_TORQUE_SIGN, "torque and position have opposite signs\0"),
 ];
 
 /// The text of a status, NUL-terminated and static; for an unknown number a text that says so.

@@ -3,3 +3,7 @@
 //! A function is `step(&Plan, &mut State, &Input) -> Output`: the plan is validated configuration with all
 //! constants derived at setup, the state is plain data, time is counted in cycles. Nothing here allocates,
 //! locks, reads a clock or can panic.
+
+pub mod backlash;
+pub mod level;
+pub mod profile;

@@ -1,0 +1,454 @@
+//! Lost motion from a torque curve, by a fit that runs in bounded slices.
+//!
+//! After a reversal the motor's torque τ, positive in the sense of the motion, follows its travel s as
+//!
+//! ```text
+//!   τ(s) = c + k·g(s),   g(s) = min(s − s1, 0) + max(s − s2, 0)
+//! ```
+//!
+//! the wind-up is released with the drive's stiffness k (N·m/mm), the clearance s1…s2 is crossed at the level c,
+//! then the drive winds up the other way until the table slides. With `before` and `after` the torque of steady
+//! sliding before and after the reversal, and `motor` the friction on the motor's side (which turns its sign at
+//! the reversal but winds nothing up), the spring's torque changes by D = after − before − 2·motor, so that
+//!
+//! ```text
+//!   lost motion = clearance + 2·Ts/k = (s2 − s1) + D/k
+//! ```
+//!
+//! Nothing here uses the torque at standstill, which is partly released, nor the break-away, which is above the
+//! sliding torque: only slopes, the two kinks and sliding levels count (CN103561904 takes the break-away peak).
+//!
+//! Kinks are searched on a grid and refined by Gauss–Newton; running sums make each trial independent of the
+//! curve's length. The stretch used ends below the sliding level, at the largest share of the wind-up whose
+//! residuals show no structure, since near sliding the curve is rounded by creep and break-away.
+
+use super::curve::{BINS, Curve, Moments};
+
+/// What is known of a reversal besides its curve. Torques in the curve's unit and sense.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Levels {
+    /// Sliding torque before the reversal, in the new sense: negative for a healthy axis.
+    pub before: f64,
+    /// Sliding torque after the reversal: positive.
+    pub after: f64,
+    /// Friction on the motor's side, at least 0.
+    pub motor: f64,
+    /// Variance of D = after − before − 2·motor.
+    pub variance: f64,
+}
+
+impl Levels {
+    /// The change of the spring's torque between sliding one way and the other.
+    #[must_use]
+    pub fn spring_change(&self) -> f64 {
+        self.after - self.before - 2.0 * self.motor
+    }
+}
+
+/// The fitted curve and what follows from it. Lengths in mm, torques in the curve's unit.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Fitted {
+    /// Lost motion and its variance (mm²).
+    pub lost_motion: f64,
+    pub variance: f64,
+    /// Clearance s2 − s1.
+    pub clearance: f64,
+    /// Elastic wind-up D/k.
+    pub windup: f64,
+    /// Travel from the reversal to the clearance: the wind-up that was still held at standstill.
+    pub held: f64,
+    /// Stiffness k and its standard error.
+    pub stiffness: f64,
+    pub stiffness_error: f64,
+    /// Torque across the clearance.
+    pub level: f64,
+    /// Standard deviation of one torque sample about the fitted curve.
+    pub noise: f64,
+    /// Share of the wind-up, from the clearance up, that was used.
+    pub share: f64,
+    /// True when residuals show structure at every share: the curve has not the expected shape.
+    pub structured: bool,
+}
+
+/// Shares of the wind-up tried, largest first.
+const SHARES: [f64; 4] = [0.85, 0.7, 0.55, 0.4];
+/// Grid points for each kink.
+const GRID: usize = 24;
+/// Trials in one slice of the search.
+const TRIALS: usize = 4;
+/// Bins in one slice of a pass over the curve.
+const SLICE: usize = 16;
+/// Gauss–Newton steps.
+const STEPS: u32 = 16;
+/// First bins left out: the motor's friction turns its sign there.
+const SKIP: f64 = 2.0;
+
+/// One trial: kinks, the linear parameters that go with them and the sum of squares left.
+#[derive(Debug, Clone, Copy)]
+struct Trial {
+    s1: f64,
+    s2: f64,
+    c: f64,
+    k: f64,
+    sse: f64,
+}
+
+const NO_TRIAL: Trial = Trial { s1: 0.0, s2: 0.0, c: 0.0, k: 0.0, sse: f64::INFINITY };
+
+/// What the next slice does.
+#[derive(Debug, Clone, Copy)]
+enum Stage {
+    /// Running sums up to a bin; ends with the curve.
+    Sum { bin: usize },
+    /// Trial number `next` of the kink grid; ends with the grid.
+    Search { next: usize },
+    /// Gauss–Newton; ends after `STEPS` or when a step brings nothing.
+    Refine { step: u32, damping: f64 },
+    /// Residuals against their neighbours; ends with the stretch.
+    Residuals { bin: usize, last: f64, count: f64, squares: f64, differences: f64 },
+    /// The result stands.
+    Done,
+}
+
+/// The fit in progress.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    stage: Stage,
+    levels: Levels,
+    share: usize,
+    first: usize,
+    end: usize,
+    ends: [usize; SHARES.len()],
+    smooth: f64,
+    best: Trial,
+    chosen: Option<Fitted>,
+    sums: [Moments; BINS + 1],
+}
+
+impl Default for Fit {
+    fn default() -> Fit {
+        Fit {
+            stage: Stage::Done,
+            levels: Levels::default(),
+            share: 0,
+            first: 0,
+            end: 0,
+            ends: [0; SHARES.len()],
+            smooth: 0.0,
+            best: NO_TRIAL,
+            chosen: None,
+            sums: [Moments::default(); BINS + 1],
+        }
+    }
+}
+
+impl Fit {
+    /// Begins the fit of a curve whose levels are known.
+    pub fn start(&mut self, levels: Levels) {
+        self.levels = levels;
+        self.share = 0;
+        self.first = 0;
+        self.ends = [usize::MAX; SHARES.len()];
+        self.smooth = levels.before;
+        self.chosen = None;
+        self.stage = Stage::Sum { bin: 0 };
+    }
+
+    /// Does one bounded slice of the work. Returns true once the result stands.
+    pub fn advance(&mut self, curve: &Curve) -> bool {
+        match self.stage {
+            Stage::Sum { bin } => self.sum(curve, bin),
+            Stage::Search { next } => self.search(curve, next),
+            Stage::Refine { step, damping } => self.refine(curve, step, damping),
+            Stage::Residuals { bin, last, count, squares, differences } => {
+                self.residuals(curve, bin, last, count, squares, differences);
+            }
+            Stage::Done => return true,
+        }
+        matches!(self.stage, Stage::Done)
+    }
+
+    /// The result; `None` when the curve is too short for a fit or no rise is in it.
+    #[must_use]
+    pub fn result(&self) -> Option<&Fitted> {
+        self.chosen.as_ref()
+    }
+
+    /// Largest number of slices that a fit may take.
+    #[must_use]
+    pub const fn slices_bound() -> u32 {
+        let passes = 2 * (BINS / SLICE + 2) + GRID * GRID / TRIALS + 2 + STEPS as usize + 4;
+        (passes * SHARES.len()) as u32
+    }
+
+    fn running(&self, bins: usize) -> &Moments {
+        &self.sums[bins.min(BINS)]
+    }
+
+    /// Running sums, and where the smoothed curve first passes each share of the wind-up.
+    fn sum(&mut self, curve: &Curve, from: usize) {
+        const SMOOTHING: f64 = 0.3; // about three bins
+        let to = (from + SLICE).min(curve.used());
+        let spring_zero = 0.5 * (self.levels.before + self.levels.after);
+        let half = 0.5 * self.levels.spring_change();
+        for bin in from..to {
+            let mut sums = *self.running(bin);
+            if bin == 0 {
+                sums = Moments::default();
+            }
+            if let Some((n, s, t)) = curve.point(bin) {
+                sums = sums.with(n, s, t);
+                self.smooth += SMOOTHING * (t - self.smooth);
+                // The rise starts at spring zero plus the motor's friction and gains `half` up to sliding.
+                let share = (self.smooth - spring_zero - self.levels.motor) / half;
+                for (end, wanted) in self.ends.iter_mut().zip(SHARES) {
+                    if *end == usize::MAX && share >= wanted {
+                        *end = bin + 1;
+                    }
+                }
+            }
+            self.sums[(bin + 1).min(BINS)] = sums;
+        }
+        self.stage = if to < curve.used() {
+            Stage::Sum { bin: to }
+        } else {
+            self.first = SKIP as usize;
+            self.next_share(curve, 0)
+        };
+    }
+
+    /// Sets up the search for the next share that the curve reaches.
+    fn next_share(&mut self, curve: &Curve, from: usize) -> Stage {
+        const FEWEST_BINS: f64 = 6.0;
+        for share in from..SHARES.len() {
+            let end = self.ends[share].min(curve.used());
+            let reached = self.ends[share] != usize::MAX;
+            let bins = self.running(end).since(self.running(self.first)).bins;
+            if reached && end > self.first && bins >= FEWEST_BINS {
+                self.share = share;
+                self.end = end;
+                self.best = NO_TRIAL;
+                return Stage::Search { next: 0 };
+            }
+        }
+        Stage::Done
+    }
+
+    /// The stretch before `s`, as a number of bins between `first` and `end`.
+    fn bins_before(&self, curve: &Curve, s: f64) -> usize {
+        let bin = (s / curve.width_mm()).max(0.0) as usize;
+        let below = matches!(curve.point(bin), Some((_, mean, _)) if mean < s);
+        (bin + usize::from(below)).clamp(self.first, self.end)
+    }
+
+    /// Sums before the first kink, after the second, and in all.
+    fn parts(&self, curve: &Curve, s1: f64, s2: f64) -> (Moments, Moments, Moments) {
+        let start = self.running(self.first);
+        let all = self.running(self.end).since(start);
+        let release = self.running(self.bins_before(curve, s1)).since(start);
+        let windup = self.running(self.end).since(self.running(self.bins_before(curve, s2)));
+        (release, windup, all)
+    }
+
+    /// Best c and k for given kinks.
+    fn trial(&self, curve: &Curve, s1: f64, s2: f64) -> Trial {
+        let (a, b, all) = self.parts(curve, s1, s2);
+        let g = (a.s - s1 * a.n) + (b.s - s2 * b.n);
+        let gg = (a.ss - 2.0 * s1 * a.s + s1 * s1 * a.n) + (b.ss - 2.0 * s2 * b.s + s2 * s2 * b.n);
+        let gt = (a.st - s1 * a.t) + (b.st - s2 * b.t);
+        let det = all.n * gg - g * g;
+        if det <= 0.0 {
+            return NO_TRIAL;
+        }
+        let k = (all.n * gt - g * all.t) / det;
+        let c = (all.t - k * g) / all.n;
+        let sse = (all.tt - c * all.t - k * gt).max(0.0);
+        if k > 0.0 { Trial { s1, s2, c, k, sse } } else { NO_TRIAL }
+    }
+
+    fn search(&mut self, curve: &Curve, from: usize) {
+        let low = self.first as f64 * curve.width_mm();
+        let step = (self.end as f64 * curve.width_mm() - low) / GRID as f64;
+        let mut next = from;
+        for _ in 0..TRIALS {
+            let (i, j) = (next / GRID, next % GRID);
+            if j >= i {
+                let trial = self.trial(curve, low + i as f64 * step, low + j as f64 * step);
+                if trial.sse < self.best.sse {
+                    self.best = trial;
+                }
+            }
+            next += 1;
+        }
+        self.stage = if next < GRID * GRID {
+            Stage::Search { next }
+        } else if self.best.sse.is_finite() {
+            Stage::Refine { step: 0, damping: 1.0 }
+        } else {
+            self.next_share(curve, self.share + 1)
+        };
+    }
+
+    /// Normal matrix of (c, k, s1, s2) and the right side that the kinks still see.
+    fn normal(&self, curve: &Curve, t: &Trial) -> ([[f64; 4]; 4], [f64; 4]) {
+        let (a, b, all) = self.parts(curve, t.s1, t.s2);
+        let (ga, gb) = (a.s - t.s1 * a.n, b.s - t.s2 * b.n);
+        let gga = a.ss - 2.0 * t.s1 * a.s + t.s1 * t.s1 * a.n;
+        let ggb = b.ss - 2.0 * t.s2 * b.s + t.s2 * t.s2 * b.n;
+        let k = t.k;
+        let matrix = [
+            [all.n, ga + gb, -k * a.n, -k * b.n],
+            [ga + gb, gga + ggb, -k * ga, -k * gb],
+            [-k * a.n, -k * ga, k * k * a.n, 0.0],
+            [-k * b.n, -k * gb, 0.0, k * k * b.n],
+        ];
+        let right = [0.0, 0.0, -k * (a.t - t.c * a.n - k * ga), -k * (b.t - t.c * b.n - k * gb)];
+        (matrix, right)
+    }
+
+    fn refine(&mut self, curve: &Curve, step: u32, damping: f64) {
+        let t = self.best;
+        let (matrix, right) = self.normal(curve, &t);
+        let mut next = Stage::Refine { step: step + 1, damping };
+        let moved = solve(matrix, right).map(|d| {
+            let largest = 0.1 * (self.end - self.first) as f64 * curve.width_mm();
+            let s1 = t.s1 + (damping * d[2]).clamp(-largest, largest);
+            let s2 = t.s2 + (damping * d[3]).clamp(-largest, largest);
+            let meet = 0.5 * (s1 + s2);
+            if s1 <= s2 { self.trial(curve, s1, s2) } else { self.trial(curve, meet, meet) }
+        });
+        match moved {
+            Some(trial) if trial.sse < t.sse => {
+                let gain = t.sse - trial.sse;
+                self.best = trial;
+                if gain < 1e-9 * t.sse {
+                    next = FIRST_RESIDUAL;
+                }
+            }
+            Some(_) if damping > 0.1 => next = Stage::Refine { step: step + 1, damping: 0.5 * damping },
+            _ => next = FIRST_RESIDUAL,
+        }
+        self.stage = match next {
+            Stage::Refine { step, .. } if step >= STEPS => FIRST_RESIDUAL,
+            Stage::Residuals { .. } | Stage::Refine { .. } => next,
+            _ => FIRST_RESIDUAL,
+        };
+    }
+
+    /// Compares each residual with its neighbour (von Neumann's ratio): 2 for white noise, less for structure.
+    fn residuals(&mut self, curve: &Curve, from: usize, last: f64, count: f64, squares: f64, differences: f64) {
+        let (mut last, mut count, mut squares, mut differences) = (last, count, squares, differences);
+        let from = from.max(self.first);
+        let to = (from + SLICE).min(self.end);
+        let t = self.best;
+        for bin in from..to {
+            if let Some((n, s, torque)) = curve.point(bin) {
+                let fitted = t.c + t.k * ((s - t.s1).min(0.0) + (s - t.s2).max(0.0));
+                let residual = n.sqrt() * (torque - fitted);
+                if count > 0.0 {
+                    differences += (residual - last) * (residual - last);
+                }
+                squares += residual * residual;
+                count += 1.0;
+                last = residual;
+            }
+        }
+        self.stage = if to < self.end {
+            Stage::Residuals { bin: to, last, count, squares, differences }
+        } else {
+            self.judge(curve, count, squares, differences)
+        };
+    }
+
+    /// Accepts this share when its residuals are white, else goes on to a smaller one.
+    fn judge(&mut self, curve: &Curve, count: f64, squares: f64, differences: f64) -> Stage {
+        const PARAMETERS: f64 = 4.0;
+        const SIGMAS: f64 = 3.0;
+        let ratio = if squares > 0.0 { differences / squares } else { 2.0 };
+        // Under white noise the ratio has mean 2 and standard deviation 2/√n.
+        let structured = ratio < 2.0 - SIGMAS * 2.0 / count.sqrt();
+        // Neighbours that move together carry less than their number: (1 + ρ)/(1 − ρ), ρ = 1 − ratio/2.
+        let correlation = (1.0 - 0.5 * ratio).clamp(0.0, 0.9);
+        let inflation = (1.0 + correlation) / (1.0 - correlation);
+        let noise = squares / (count - PARAMETERS).max(1.0);
+        let fitted = self.derive(curve, noise, inflation, structured);
+        let better = match (&self.chosen, &fitted) {
+            (_, None) => false,
+            (None, Some(_)) => true,
+            (Some(old), Some(new)) => !new.structured || new.variance < old.variance,
+        };
+        if better {
+            self.chosen = fitted;
+        }
+        if structured { self.next_share(curve, self.share + 1) } else { Stage::Done }
+    }
+
+    /// Lost motion and its variance from the fitted kinks, slope and levels.
+    fn derive(&self, curve: &Curve, noise: f64, inflation: f64, structured: bool) -> Option<Fitted> {
+        let t = self.best;
+        let change = self.levels.spring_change();
+        let (matrix, _) = self.normal(curve, &t);
+        let scale = noise * inflation;
+        // d(lost motion)/d(c, k, s1, s2); the levels come from other samples.
+        let gradient = [0.0, -change / (t.k * t.k), -1.0, 1.0];
+        let (fit_variance, k_variance) = if t.s2 - t.s1 > curve.width_mm() {
+            let weights = solve(matrix, gradient)?;
+            let lost: f64 = weights.iter().zip(gradient).map(|(w, g)| w * g).sum();
+            let unit = solve(matrix, [0.0, 1.0, 0.0, 0.0])?;
+            (lost * scale, unit[1] * scale)
+        } else {
+            // No clearance is resolved: the curve is one straight line, and only its slope counts.
+            let all = self.running(self.end).since(self.running(self.first));
+            let k_variance = scale / (all.ss - all.s * all.s / all.n);
+            (k_variance * gradient[1] * gradient[1], k_variance)
+        };
+        let windup = change / t.k;
+        let clearance = t.s2 - t.s1;
+        let variance = fit_variance + self.levels.variance / (t.k * t.k);
+        (variance.is_finite() && variance >= 0.0).then_some(Fitted {
+            lost_motion: clearance + windup,
+            variance,
+            clearance,
+            windup,
+            held: t.s1,
+            stiffness: t.k,
+            stiffness_error: k_variance.max(0.0).sqrt(),
+            level: t.c,
+            noise: noise.sqrt(),
+            share: SHARES[self.share.min(SHARES.len() - 1)],
+            structured,
+        })
+    }
+}
+
+const FIRST_RESIDUAL: Stage = Stage::Residuals { bin: 0, last: 0.0, count: 0.0, squares: 0.0, differences: 0.0 };
+
+/// Solves a symmetric positive definite system of four by Cholesky; `None` when it is singular.
+fn solve(matrix: [[f64; 4]; 4], right: [f64; 4]) -> Option<[f64; 4]> {
+    const SINGULAR: f64 = 1e-10;
+    let mut l = [[0.0; 4]; 4];
+    for i in 0..4 {
+        for j in 0..=i {
+            let dot: f64 = (0..j).map(|m| l[i][m] * l[j][m]).sum();
+            let rest = matrix[i][j] - dot;
+            if i == j {
+                if rest <= SINGULAR * matrix[i][i] {
+                    return None;
+                }
+                l[i][i] = rest.sqrt();
+            } else {
+                l[i][j] = rest / l[j][j];
+            }
+        }
+    }
+    let mut y = right;
+    for i in 0..4 {
+        let dot: f64 = (0..i).map(|m| l[i][m] * y[m]).sum();
+        y[i] = (y[i] - dot) / l[i][i];
+    }
+    for i in (0..4).rev() {
+        let dot: f64 = (i + 1..4).map(|m| l[m][i] * y[m]).sum();
+        y[i] = (y[i] - dot) / l[i][i];
+    }
+    Some(y)
+}

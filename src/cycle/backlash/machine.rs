@@ -1,0 +1,467 @@
+//! The state machine of a lost-motion measurement: one call per servo cycle.
+//!
+//! ```text
+//! Idle → Begin → Clear → for each reversal (Approach → SlideBack → SlideIn → Settle → Scan → ProbeBack → ProbeForth →
+//!                                   Evaluate) → Write → Done
+//!          any state ──fault, abort, deadline, refusal──▶ leave: Stopping → Restore → Failed
+//! ```
+//!
+//! `leave` is the one door out. Every state but Idle, Done and Failed has a deadline in cycles, set when the
+//! state is entered; when it runs out the machine leaves. In Failed the restoring request stays on the output, so
+//! that a kernel which comes back late still sees it.
+
+use super::config::Plan;
+use super::curve::Curve;
+use super::fit::{Fit, Levels};
+use super::io::*;
+use super::peak::Peak;
+use super::verdict::{BacklashEstimate, Sense};
+use crate::cycle::level::Level;
+use crate::cycle::profile::Profile;
+use crate::error::*;
+
+mod measure;
+
+/// Where the machine is. Each comment says what ends the state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Phase {
+    /// Ends with `start`.
+    Idle,
+    /// Ends with its first cycle, which tells where the axis stands and which amount is in force.
+    Begin,
+    /// Ends when the kernel confirms amount 0 and reversal acceleration off.
+    Clear,
+    /// Ends at the reference position.
+    Approach,
+    /// Ends `run_in` behind the reference.
+    SlideBack,
+    /// Ends at the reference.
+    SlideIn,
+    /// Ends when the rest is over.
+    Settle,
+    /// Ends when the torque no longer grows.
+    Scan,
+    /// Ends when the motor has gone `depth` back.
+    ProbeBack,
+    /// Ends when the motor has come forth again.
+    ProbeForth,
+    /// Ends when the peak rule has seen bin `bin` and all after it.
+    EvaluatePeak { bin: usize },
+    /// Ends when the fit stands.
+    EvaluateFit,
+    /// Ends when the kernel confirms the amount asked for and reversal acceleration back.
+    Write { then: After },
+    /// Ends when the commanded speed is 0.
+    Stopping,
+    /// Ends when the kernel confirms the old amount and reversal acceleration back.
+    Restore,
+    /// Ends with the next `start`.
+    Done,
+    /// Ends with the next `start`.
+    Failed,
+}
+
+/// What follows a confirmed write.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum After {
+    Done,
+    Idle,
+}
+
+/// What an operator asked for between measurements.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Wish {
+    /// Write the amount that was in force before the last written one.
+    RestoreOld,
+    /// Take the compensation out and refuse measurements.
+    Disable,
+    /// Put the compensation back and allow measurements.
+    Enable,
+}
+
+/// Reading of the scan while it runs: the smoothed torque as a share of sliding, −1 before, +1 after.
+#[derive(Debug, Clone, Copy, Default)]
+struct Watch {
+    middle: f64,
+    per_half: f64,
+    smooth: f64,
+    gain: f64,
+    margin: f64,
+    highest: f64,
+    highest_at: f64,
+    low_at: f64,
+    high_at: f64,
+}
+
+/// Torque of the probe both ways, over the middle of its way.
+#[derive(Debug, Clone, Copy, Default)]
+struct Probe {
+    turn: f64,
+    depth: f64,
+    back: Level,
+    forth: Level,
+}
+
+/// A lost-motion measurement of one axis: plain data, no pointers.
+#[derive(Debug, Clone)]
+pub struct Backlash {
+    plan: Plan,
+    phase: Phase,
+    enabled: bool,
+    wish: Option<Wish>,
+    /// First fault of this run.
+    fault: Fault,
+    /// Cycles left to the present state.
+    left: u32,
+    /// Cycles left to the present motor step.
+    hold: u32,
+    /// Number of the present reversal, from 0.
+    reversal: u32,
+    references: [f64; 2],
+    /// Sense of the scan, ±1.
+    sense: f64,
+    /// Measured and commanded position where the present scan turned.
+    turn: f64,
+    turn_command: f64,
+    profile: Profile,
+    last_position: f64,
+    smallest_change: f64,
+    before: Level,
+    after: Level,
+    watch: Watch,
+    probe: Probe,
+    peak: Peak,
+    levels: Levels,
+    senses: [Sense; 2],
+    /// Amount that the door restores.
+    fallback_um: f64,
+    /// Amount that the last written one replaced; `None` before a write.
+    old_um: Option<f64>,
+    written_um: Option<f64>,
+    parked_um: f64,
+    active_um: f64,
+    /// True while the kernel runs with something that gib changed and has not put right.
+    changed: bool,
+    estimates: [BacklashEstimate; 2],
+    mean: BacklashEstimate,
+    output: BacklashOutput,
+    curves: [Curve; 2],
+    fit: Fit,
+}
+
+impl Default for Backlash {
+    fn default() -> Backlash {
+        Backlash {
+            plan: Plan::REST,
+            phase: Phase::Idle,
+            enabled: true,
+            wish: None,
+            fault: Fault::NONE,
+            left: 0,
+            hold: 0,
+            reversal: 0,
+            references: [0.0; 2],
+            sense: 1.0,
+            turn: 0.0,
+            turn_command: 0.0,
+            profile: Profile::default(),
+            last_position: 0.0,
+            smallest_change: f64::INFINITY,
+            before: Level::default(),
+            after: Level::default(),
+            watch: Watch::default(),
+            probe: Probe::default(),
+            peak: Peak::default(),
+            levels: Levels::default(),
+            senses: [Sense::default(); 2],
+            fallback_um: 0.0,
+            old_um: None,
+            written_um: None,
+            parked_um: 0.0,
+            active_um: 0.0,
+            changed: false,
+            estimates: [BacklashEstimate::default(); 2],
+            mean: BacklashEstimate::default(),
+            output: BacklashOutput::default(),
+            curves: [Curve::default(), Curve::default()],
+            fit: Fit::default(),
+        }
+    }
+}
+
+impl Backlash {
+    /// Arms a measurement; it begins with the next step.
+    ///
+    /// # Errors
+    /// `GIB_ERR_STATE` while busy, `GIB_ERR_DISABLED`, `GIB_ERR_RESTORE_UNCONFIRMED` while a restore is owed,
+    /// `GIB_ERR_CONFIG` with the field.
+    pub fn start(&mut self, plan: Result<Plan, Fault>) -> Result<(), Fault> {
+        if self.busy() || self.wish.is_some() {
+            return Err(Fault::of(GIB_ERR_STATE));
+        }
+        if !self.enabled {
+            return Err(Fault::of(GIB_ERR_DISABLED));
+        }
+        if self.changed {
+            return Err(Fault::of(GIB_ERR_RESTORE_UNCONFIRMED));
+        }
+        self.plan = plan?;
+        self.fault = Fault::NONE;
+        self.senses = [Sense::default(); 2];
+        self.estimates = [BacklashEstimate::default(); 2];
+        self.mean = BacklashEstimate::default();
+        self.written_um = None;
+        self.curves.iter_mut().for_each(|curve| curve.start(self.plan.bin));
+        self.smallest_change = f64::INFINITY;
+        self.reversal = 0;
+        self.output.message = 0;
+        self.output.progress_ratio = 0.0;
+        self.enter(Phase::Begin, 2.0);
+        Ok(())
+    }
+
+    /// Asks for something between measurements; carried out from the next step on.
+    ///
+    /// # Errors
+    /// `GIB_ERR_STATE` when the present state does not allow it.
+    pub fn wish(&mut self, wish: Wish) -> Result<(), Fault> {
+        let allowed = match wish {
+            Wish::RestoreOld => !self.busy() && self.wish.is_none() && self.enabled && self.old_um.is_some(),
+            Wish::Disable => self.enabled,
+            Wish::Enable => !self.enabled && !self.busy() && self.wish.is_none(),
+        };
+        if !allowed {
+            return Err(Fault::of(GIB_ERR_STATE));
+        }
+        if wish == Wish::Disable && self.busy() {
+            self.leave(Fault::of(GIB_ERR_DISABLED));
+        }
+        self.enabled = wish != Wish::Disable;
+        self.wish = Some(wish);
+        Ok(())
+    }
+
+    /// Aborts a running measurement: brake, restore, fail with `GIB_ERR_ABORTED`. Nothing when not busy.
+    pub fn abort(&mut self) {
+        if self.busy() {
+            self.leave(Fault::of(GIB_ERR_ABORTED));
+        }
+    }
+
+    /// True from `start` until Done or Failed.
+    #[must_use]
+    pub fn busy(&self) -> bool {
+        !matches!(self.phase, Phase::Idle | Phase::Done | Phase::Failed)
+    }
+
+    /// One servo cycle.
+    #[inline]
+    pub fn step(&mut self, input: &BacklashInput) -> &BacklashOutput {
+        if matches!(self.phase, Phase::Idle | Phase::Done | Phase::Failed) {
+            self.rest(input);
+            return &self.output;
+        }
+        if let Some(fault) = self.danger(input) {
+            self.leave(fault);
+        } else if self.left == 0 {
+            self.overdue();
+        } else {
+            self.left -= 1;
+            self.advance(input);
+        }
+        self.output.target_position_mm = self.profile.position;
+        self.output.target_speed_mm_s = self.profile.speed * self.plan.cycles_per_s;
+        self.output.remaining_mm = (self.profile.goal - self.profile.position).abs();
+        &self.output
+    }
+
+    /// Idle, Done, Failed: follows the axis, carries out wishes, and waits for a restore that is still owed.
+    #[inline(always)]
+    fn rest(&mut self, input: &BacklashInput) {
+        if input.position_mm.is_finite() {
+            self.output.target_position_mm = input.position_mm;
+        }
+        if self.wish.is_some() || self.changed {
+            self.between(input);
+        }
+    }
+
+    #[cold]
+    fn between(&mut self, input: &BacklashInput) {
+        if self.changed {
+            if self.confirmed(input) {
+                self.changed = false;
+                self.output.message = self.fault.code;
+            }
+            return;
+        }
+        if !(input.position_mm.is_finite() && input.compensation_um.is_finite()) {
+            return;
+        }
+        self.profile = Profile::at_rest(input.position_mm, self.plan.acceleration);
+        self.fallback_um = input.compensation_um;
+        self.fault = Fault::NONE;
+        let amount = match self.wish.take() {
+            Some(Wish::RestoreOld) => self.old_um.unwrap_or(input.compensation_um),
+            Some(Wish::Disable) => {
+                self.parked_um = input.compensation_um;
+                0.0
+            }
+            _ => self.parked_um,
+        };
+        self.request(amount, false);
+        self.enter(Phase::Write { then: After::Idle }, f64::from(self.plan.ack_timeout));
+    }
+
+    /// Anything in this cycle's input that must end a measurement. Braking and restoring go on regardless.
+    #[inline(always)]
+    fn danger(&self, input: &BacklashInput) -> Option<Fault> {
+        let plan = &self.plan;
+        let position = input.position_mm;
+        let safe = input.flags == 0
+            && input.torque.abs() <= plan.torque_bound
+            && position >= plan.travel[0]
+            && position <= plan.travel[1]
+            && (self.profile.position - position).abs() <= plan.lag_limit
+            && input.compensation_um.is_finite();
+        if safe || matches!(self.phase, Phase::Stopping | Phase::Restore | Phase::Write { then: After::Idle }) {
+            return None;
+        }
+        self.name_danger(input)
+    }
+
+    #[cold]
+    fn name_danger(&self, input: &BacklashInput) -> Option<Fault> {
+        let plan = &self.plan;
+        let fault = |code, field, value, low, high| Some(Fault { code, field, value, low, high });
+        let finite = |field, value: f64| fault(GIB_ERR_NON_FINITE, field, value, f64::MIN, f64::MAX);
+        if input.flags & GIB_INPUT_ABORT != 0 {
+            return Some(Fault::of(GIB_ERR_ABORTED));
+        }
+        if input.flags != 0 {
+            return Some(Fault::of(GIB_ERR_DRIVE_FAULT));
+        }
+        if !input.position_mm.is_finite() {
+            return finite("position_mm\0", input.position_mm);
+        }
+        if !input.torque.is_finite() {
+            return finite("torque\0", input.torque);
+        }
+        if !input.compensation_um.is_finite() {
+            return finite("compensation_um\0", input.compensation_um);
+        }
+        if input.torque.abs() > plan.torque_bound {
+            return fault(GIB_ERR_TORQUE_BOUND, "torque\0", input.torque, -plan.torque_bound, plan.torque_bound);
+        }
+        if !(plan.travel[0]..=plan.travel[1]).contains(&input.position_mm) {
+            let position = input.position_mm;
+            return fault(GIB_ERR_TRAVEL_BOUND, "position_mm\0", position, plan.travel[0], plan.travel[1]);
+        }
+        if self.phase == Phase::Begin {
+            return None; // no command was given yet, so nothing can lag
+        }
+        let lag = self.profile.position - input.position_mm;
+        fault(GIB_ERR_LAG, "position_mm\0", lag, -plan.lag_limit, plan.lag_limit)
+    }
+
+    /// A deadline has passed.
+    #[cold]
+    fn overdue(&mut self) {
+        match self.phase {
+            Phase::Restore => self.give_up(),
+            Phase::Stopping => self.restore(),
+            Phase::Clear | Phase::Write { .. } => {
+                let (value, low) = (f64::from(self.output.request_id), f64::from(self.output.request_id));
+                self.leave(Fault { code: GIB_ERR_ACK_TIMEOUT, field: "acknowledged_id\0", value, low, high: low });
+            }
+            _ => self.leave(Fault { code: GIB_ERR_DEADLINE, field: "phase\0", ..Fault::NONE }),
+        }
+    }
+
+    /// The one door out of a measurement: keeps the first fault, brakes, restores, fails.
+    #[cold]
+    fn leave(&mut self, fault: Fault) {
+        if matches!(self.phase, Phase::Stopping | Phase::Restore) {
+            return; // on the way out already
+        }
+        self.fault = fault;
+        self.output.message = fault.code;
+        if self.profile.speed != 0.0 && fault.code != GIB_ERR_DRIVE_FAULT {
+            self.profile.stop();
+            let bound = self.profile.cycles_bound();
+            self.enter(Phase::Stopping, bound);
+        } else {
+            self.restore();
+        }
+    }
+
+    /// Second half of the door: asks for the old amount if anything was changed.
+    fn restore(&mut self) {
+        self.profile.stop();
+        self.profile.speed = 0.0;
+        self.profile.goal = self.profile.position;
+        if self.changed {
+            self.request(self.fallback_um, false);
+            self.enter(Phase::Restore, f64::from(self.plan.ack_timeout));
+        } else {
+            self.fail();
+        }
+    }
+
+    /// The restore was not confirmed in time. The request stays on the output.
+    fn give_up(&mut self) {
+        self.fail();
+        self.output.message = GIB_ERR_RESTORE_UNCONFIRMED;
+    }
+
+    fn fail(&mut self) {
+        self.enter(Phase::Failed, 0.0);
+        self.output.status = self.fault.code;
+    }
+
+    /// Asks the kernel for a compensation amount and for reversal acceleration off, or as configured.
+    fn request(&mut self, amount_um: f64, reversal_off: bool) {
+        self.output.compensation_um = amount_um;
+        self.output.reversal_acceleration_off = i32::from(reversal_off);
+        self.output.request_id = self.output.request_id.wrapping_add(1).max(1);
+        self.changed = true;
+    }
+
+    /// True when the kernel has carried out the present request and runs with the amount asked for.
+    #[inline(always)]
+    fn confirmed(&self, input: &BacklashInput) -> bool {
+        input.acknowledged_id == self.output.request_id
+            && (input.compensation_um - self.output.compensation_um).abs() <= self.plan.compensation_tolerance_um
+    }
+
+    /// Goes to a state that must end within `cycles`.
+    fn enter(&mut self, phase: Phase, cycles: f64) {
+        self.phase = phase;
+        self.left = cycles as u32;
+        self.output.phase = match phase {
+            Phase::Idle => GIB_BACKLASH_IDLE,
+            Phase::Begin | Phase::Clear => GIB_BACKLASH_CLEAR,
+            Phase::Approach => GIB_BACKLASH_APPROACH,
+            Phase::SlideBack => GIB_BACKLASH_SLIDE_BACK,
+            Phase::SlideIn => GIB_BACKLASH_SLIDE_IN,
+            Phase::Settle => GIB_BACKLASH_SETTLE,
+            Phase::Scan => GIB_BACKLASH_SCAN,
+            Phase::ProbeBack | Phase::ProbeForth => GIB_BACKLASH_PROBE,
+            Phase::EvaluatePeak { .. } | Phase::EvaluateFit => GIB_BACKLASH_EVALUATE,
+            Phase::Write { .. } => GIB_BACKLASH_WRITE,
+            Phase::Stopping => GIB_BACKLASH_STOPPING,
+            Phase::Restore => GIB_BACKLASH_RESTORE,
+            Phase::Done => GIB_BACKLASH_DONE,
+            Phase::Failed => GIB_BACKLASH_FAILED,
+        };
+        let resting = matches!(phase, Phase::Idle | Phase::Done | Phase::Failed);
+        self.output.owns_motion =
+            i32::from(!resting && !matches!(phase, Phase::Begin | Phase::Write { then: After::Idle }));
+        self.output.target_speed_mm_s = 0.0;
+        self.output.status = match phase {
+            Phase::Idle => GIB_OK,
+            Phase::Done => GIB_DONE,
+            _ => GIB_BUSY,
+        };
+    }
+}

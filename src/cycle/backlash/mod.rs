@@ -1,0 +1,25 @@
+//! Lost motion of one axis, measured from motor torque alone and written back as compensation.
+//!
+//! The sequence follows CN103561904: compensation amount 0 and reversal acceleration off, to the reference
+//! position in the first sense, reverse, step the motor and watch the torque; the same the other way; write the
+//! mean, restore the rest. Two things are different, and why: the whole torque curve is fitted, since the
+//! published break-away peak reads low ([`fit`]), and after each scan the motor goes a few µm back and forth
+//! while the table sticks, since only that shows how much of the friction is on the motor's side and winds
+//! nothing up ([`machine`]).
+//!
+//! | file | purpose |
+//! |---|---|
+//! | [`config`] | what the caller asks for, checked once |
+//! | [`io`] | what crosses the boundary in a cycle |
+//! | [`machine`] | the state machine called once per servo cycle |
+//! | [`curve`] | torque against travel |
+//! | [`fit`], [`peak`] | lost motion from a curve: ours and the published rule |
+//! | [`verdict`] | means, uncertainty, and whether to trust them |
+
+pub mod config;
+pub mod curve;
+pub mod fit;
+pub mod io;
+pub mod machine;
+pub mod peak;
+pub mod verdict;

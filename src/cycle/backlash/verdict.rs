@@ -1,0 +1,238 @@
+//! From single reversals to one value: means over repeats and senses, uncertainty, and whether to trust it.
+//!
+//! The variance of a mean over n reversals is the larger of what the fits expect and what the repeats show
+//! (Birge's ratio), so that neither a lucky spread nor an optimistic fit makes the uncertainty too small.
+
+use super::config::Plan;
+use super::fit::{Fitted, Levels};
+use crate::error::{
+    Fault, GIB_ERR_BACKLASH_DIRECTIONS, GIB_ERR_BACKLASH_LIMIT, GIB_ERR_BACKLASH_NOISE, GIB_ERR_BACKLASH_RESOLUTION,
+    GIB_ERR_BACKLASH_SHAPE,
+};
+
+/// Lost motion of one sense, or the mean of both. Lost motion is estimated from torque: it is not the reversal
+/// value of ISO 230-2. Lengths in µm; uncertainties are expanded, k = 2.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct BacklashEstimate {
+    /// Lost motion between steady slow motion one way and the other: clearance + 2·Ts/k.
+    pub lost_motion_um: f64,
+    /// Its expanded uncertainty, k = 2.
+    pub uncertainty_um: f64,
+    /// Part of it that is clearance.
+    pub clearance_um: f64,
+    /// Part of it that is elastic wind-up, 2·Ts/k.
+    pub windup_um: f64,
+    /// Lost motion at standstill, clearance + (|TA+| + |TA-|)/k: what a laser at rest sees.
+    pub standstill_um: f64,
+    /// Standard deviation over the repeats; 0 with one repeat.
+    pub spread_um: f64,
+    /// What the published peak rule reads on the same curves; 0 where it found no peak.
+    pub peak_um: f64,
+    /// Stiffness of the drive at the motor, N·m/mm, and its standard uncertainty.
+    pub stiffness_nm_mm: f64,
+    /// Standard uncertainty of the stiffness, N·m/mm.
+    pub stiffness_error_nm_mm: f64,
+    /// Sliding friction, half the change of torque between the two senses, N·m.
+    pub sliding_nm: f64,
+    /// Part of it that acts on the motor's side and winds nothing up, N·m.
+    pub motor_friction_nm: f64,
+    /// Standard deviation of one torque sample about the fitted curve, N·m.
+    pub noise_nm: f64,
+    /// Reversals measured.
+    pub reversals: i32,
+    /// Reversals in which the peak rule found a peak.
+    pub peaks: i32,
+    /// Motor steps (points of the curve) taken in all.
+    pub steps: i32,
+    /// Reversals whose residuals show structure: the curve is not quite the model's.
+    pub structured: i32,
+}
+
+/// Everything measured so far in one sense.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Sense {
+    reversals: f64,
+    sum: f64,
+    squares: f64,
+    variances: f64,
+    clearance: f64,
+    windup: f64,
+    held: f64,
+    stiffness: f64,
+    stiffness_variance: f64,
+    sliding: f64,
+    motor: f64,
+    noise: f64,
+    peaks: f64,
+    peak_sum: f64,
+    steps: f64,
+    structured: f64,
+}
+
+impl Sense {
+    /// Adds a reversal: its fit, its levels, the peak rule's reading (mm) if any, and the points of its curve.
+    pub fn add(&mut self, fit: &Fitted, levels: &Levels, peak: Option<f64>, steps: usize) {
+        self.reversals += 1.0;
+        self.sum += fit.lost_motion;
+        self.squares += fit.lost_motion * fit.lost_motion;
+        self.variances += fit.variance;
+        self.clearance += fit.clearance;
+        self.windup += fit.windup;
+        self.held += fit.held;
+        self.stiffness += fit.stiffness;
+        self.stiffness_variance += fit.stiffness_error * fit.stiffness_error;
+        self.sliding += 0.5 * (levels.after - levels.before);
+        self.motor += levels.motor;
+        self.noise += fit.noise;
+        self.structured += f64::from(u8::from(fit.structured));
+        self.steps += steps as f64;
+        if let Some(position) = peak {
+            self.peaks += 1.0;
+            self.peak_sum += position;
+        }
+    }
+
+    /// Reversals added.
+    #[must_use]
+    pub fn reversals(&self) -> f64 {
+        self.reversals
+    }
+
+    /// Variance of the mean lost motion, mm²; `encoder` is the grid of the position input in mm.
+    fn variance_of_mean(&self, encoder: f64) -> f64 {
+        let n = self.reversals.max(1.0);
+        let expected = self.variances / n;
+        let seen = if n > 1.0 { ((self.squares - self.sum * self.sum / n) / (n - 1.0)).max(0.0) } else { 0.0 };
+        // Each end of the lost motion lies somewhere on the encoder's grid, the same in every repeat.
+        expected.max(seen) / n + encoder * encoder / 6.0
+    }
+
+    /// The estimate for this sense; `other` supplies the wind-up held on the far side at standstill.
+    fn estimate(&self, plan: &Plan, encoder: f64, other: &Sense) -> BacklashEstimate {
+        let n = self.reversals.max(1.0);
+        let far = if other.reversals > 0.0 { other.held / other.reversals } else { self.held / n };
+        let clearance = self.clearance / n;
+        let um = 1e3;
+        let nm = plan.torque_nm;
+        BacklashEstimate {
+            lost_motion_um: self.sum / n * um,
+            uncertainty_um: 2.0 * self.variance_of_mean(encoder).sqrt() * um,
+            clearance_um: clearance * um,
+            windup_um: self.windup / n * um,
+            standstill_um: (clearance + self.held / n + far) * um,
+            spread_um: if n > 1.0 {
+                ((self.squares - self.sum * self.sum / n) / (n - 1.0)).max(0.0).sqrt() * um
+            } else {
+                0.0
+            },
+            peak_um: if self.peaks > 0.0 { self.peak_sum / self.peaks * um } else { 0.0 },
+            stiffness_nm_mm: self.stiffness / n * nm,
+            stiffness_error_nm_mm: self.stiffness_variance.sqrt() / n * nm,
+            sliding_nm: self.sliding / n * nm,
+            motor_friction_nm: self.motor / n * nm,
+            noise_nm: self.noise / n * nm,
+            reversals: self.reversals as i32,
+            peaks: self.peaks as i32,
+            steps: self.steps as i32,
+            structured: self.structured as i32,
+        }
+    }
+}
+
+/// Estimates of both senses and their mean; a sense that was not measured is all zero.
+#[must_use]
+pub fn estimates(plan: &Plan, encoder: f64, senses: &[Sense; 2]) -> ([BacklashEstimate; 2], BacklashEstimate) {
+    let first = senses[0].estimate(plan, encoder, &senses[1]);
+    if plan.senses == 1 {
+        return ([first, BacklashEstimate::default()], first);
+    }
+    let second = senses[1].estimate(plan, encoder, &senses[0]);
+    let half = |a: f64, b: f64| 0.5 * (a + b);
+    let root = |a: f64, b: f64| 0.5 * (a * a + b * b).sqrt();
+    let mean = BacklashEstimate {
+        lost_motion_um: half(first.lost_motion_um, second.lost_motion_um),
+        uncertainty_um: root(first.uncertainty_um, second.uncertainty_um),
+        clearance_um: half(first.clearance_um, second.clearance_um),
+        windup_um: half(first.windup_um, second.windup_um),
+        standstill_um: half(first.standstill_um, second.standstill_um),
+        spread_um: half(first.spread_um * first.spread_um, second.spread_um * second.spread_um).sqrt(),
+        peak_um: match (first.peaks, second.peaks) {
+            (0, _) => second.peak_um,
+            (_, 0) => first.peak_um,
+            _ => half(first.peak_um, second.peak_um),
+        },
+        stiffness_nm_mm: half(first.stiffness_nm_mm, second.stiffness_nm_mm),
+        stiffness_error_nm_mm: root(first.stiffness_error_nm_mm, second.stiffness_error_nm_mm),
+        sliding_nm: half(first.sliding_nm, second.sliding_nm),
+        motor_friction_nm: half(first.motor_friction_nm, second.motor_friction_nm),
+        noise_nm: half(first.noise_nm, second.noise_nm),
+        reversals: first.reversals + second.reversals,
+        peaks: first.peaks + second.peaks,
+        steps: first.steps + second.steps,
+        structured: first.structured + second.structured,
+    };
+    ([first, second], mean)
+}
+
+/// Largest expanded uncertainty, as a share of the value, at which a compensation is still an improvement worth
+/// writing: beyond it the remaining error may be a third of the lost motion.
+const WORST_UNCERTAINTY: f64 = 0.33;
+/// Disagreement of the senses, in standard uncertainties of their difference, that chance does not explain
+/// (3 in 10 000).
+const DISAGREEMENT: f64 = 3.6;
+
+/// Says whether one reversal can be used.
+///
+/// # Errors
+/// `GIB_ERR_BACKLASH_SHAPE`, `GIB_ERR_BACKLASH_NOISE`.
+pub fn check_reversal(fit: Option<&Fitted>) -> Result<Fitted, Fault> {
+    let Some(fit) = fit else { return Err(Fault::of(GIB_ERR_BACKLASH_SHAPE)) };
+    // A slope that is not at least five standard errors from none cannot carry the wind-up.
+    const SLOPE: f64 = 5.0;
+    if fit.stiffness < SLOPE * fit.stiffness_error {
+        let found = fit.stiffness / fit.stiffness_error.max(f64::MIN_POSITIVE);
+        return Err(Fault {
+            code: GIB_ERR_BACKLASH_NOISE,
+            field: "torque\0",
+            value: found,
+            low: SLOPE,
+            high: f64::MAX,
+        });
+    }
+    Ok(*fit)
+}
+
+/// Says whether the whole result can be written.
+///
+/// # Errors
+/// `GIB_ERR_BACKLASH_NOISE`, `_RESOLUTION`, `_DIRECTIONS`, `_LIMIT`, each with what was found and allowed.
+pub fn check_result(
+    plan: &Plan,
+    encoder: f64,
+    each: &[BacklashEstimate; 2],
+    mean: &BacklashEstimate,
+    amount_um: f64,
+) -> Result<(), Fault> {
+    let value = mean.lost_motion_um;
+    let fault = |code, field, value, low, high| Err(Fault { code, field, value, low, high });
+    let finest = (2.0e3 * encoder).max(mean.uncertainty_um);
+    if value < finest {
+        return fault(GIB_ERR_BACKLASH_RESOLUTION, "lost_motion_um\0", value, finest, f64::MAX);
+    }
+    let worst = WORST_UNCERTAINTY * value;
+    if mean.uncertainty_um > worst {
+        return fault(GIB_ERR_BACKLASH_NOISE, "uncertainty_um\0", mean.uncertainty_um, 0.0, worst);
+    }
+    if plan.senses == 2 {
+        let apart = (each[0].lost_motion_um - each[1].lost_motion_um).abs();
+        let allowed = 0.5 * DISAGREEMENT * (each[0].uncertainty_um.powi(2) + each[1].uncertainty_um.powi(2)).sqrt();
+        if apart > allowed {
+            return fault(GIB_ERR_BACKLASH_DIRECTIONS, "lost_motion_um\0", apart, 0.0, allowed);
+        }
+    }
+    if !(amount_um > 0.0 && amount_um <= plan.compensation_max_um) {
+        return fault(GIB_ERR_BACKLASH_LIMIT, "compensation_max_um\0", amount_um, 0.0, plan.compensation_max_um);
+    }
+    Ok(())
+}
