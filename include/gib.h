@@ -174,6 +174,11 @@
 #define GIB_ERR_VERSION (-20)
 
 /**
+ * The axis does not follow its command: following error beyond the limit, or an encoder that stands still.
+ */
+#define GIB_ERR_LAG (-21)
+
+/**
  * The torque never rose after the reversal: no end of the lost motion was seen.
  */
 #define GIB_ERR_BACKLASH_NO_RISE (-100)
@@ -209,12 +214,518 @@
 #define GIB_ERR_BACKLASH_MOTOR_FRICTION (-106)
 
 /**
+ * The torque falls where it should rise: its sign does not agree with the position's.
+ */
+#define GIB_ERR_BACKLASH_TORQUE_SIGN (-107)
+
+/**
+ * Slow-feed mode (default): the motor is fed slowly and the torque read in every cycle. The more accurate one.
+ */
+#define GIB_BACKLASH_SLOW_FEED 0
+
+/**
+ * Step mode, as published: the motor is stepped and the torque read at the end of each dwell.
+ */
+#define GIB_BACKLASH_STEP 1
+
+/**
+ * Whole-curve fit (default).
+ */
+#define GIB_BACKLASH_FIT 0
+
+/**
+ * The published peak rule: rise, rise, fall of |torque|. Reads low; see the manual.
+ */
+#define GIB_BACKLASH_PEAK 1
+
+/**
+ * Torque inputs in N·m.
+ */
+#define GIB_TORQUE_NM 0
+
+/**
+ * Torque inputs in ‰ of the rated torque.
+ */
+#define GIB_TORQUE_PERMILLE 1
+
+/**
+ * The axis stands; gib asks for nothing.
+ */
+#define GIB_BACKLASH_IDLE 0
+
+/**
+ * Waits until the compensation amount is 0 and reversal acceleration off.
+ */
+#define GIB_BACKLASH_CLEAR 1
+
+/**
+ * Moves to the next reference position.
+ */
+#define GIB_BACKLASH_APPROACH 2
+
+/**
+ * Slides back from the reference: sliding torque of the coming scan's sense.
+ */
+#define GIB_BACKLASH_SLIDE_BACK 3
+
+/**
+ * Slides to the reference: sliding torque before the reversal.
+ */
+#define GIB_BACKLASH_SLIDE_IN 4
+
+/**
+ * Rests before the reversal.
+ */
+#define GIB_BACKLASH_SETTLE 5
+
+/**
+ * Reversed: steps or feeds slowly and records the torque curve.
+ */
+#define GIB_BACKLASH_SCAN 6
+
+/**
+ * Goes a few µm back and forth while the table sticks: friction on the motor's side.
+ */
+#define GIB_BACKLASH_PROBE 7
+
+/**
+ * Stands while the curve is evaluated in slices.
+ */
+#define GIB_BACKLASH_EVALUATE 8
+
+/**
+ * Waits until the new amount is in force and reversal acceleration back.
+ */
+#define GIB_BACKLASH_WRITE 9
+
+/**
+ * Brakes before everything changed is restored.
+ */
+#define GIB_BACKLASH_STOPPING 10
+
+/**
+ * Waits until the old amount is in force and reversal acceleration back.
+ */
+#define GIB_BACKLASH_RESTORE 11
+
+/**
+ * Ended well.
+ */
+#define GIB_BACKLASH_DONE 12
+
+/**
+ * Ended with an error; kept until the next start.
+ */
+#define GIB_BACKLASH_FAILED 13
+
+/**
+ * Input flag: the drive is faulted, or not under the kernel's control.
+ */
+#define GIB_INPUT_FAULT 1
+
+/**
+ * Input flag: abort, as `gib_backlash_abort` does.
+ */
+#define GIB_INPUT_ABORT 2
+
+/**
  * Version of this interface: major · 65536 + minor.
  *
  * Within one major, functions, struct tails and status numbers are added and nothing is changed or taken away;
  * each addition raises the minor. The major is also the number at the end of `libgib.so.0`.
  */
 #define GIB_ABI_VERSION 1
+
+/**
+ * A lost-motion measurement of one axis. Opaque; its size is `gib_backlash_size()`.
+ */
+typedef struct gib_backlash gib_backlash;
+
+/**
+ * What to measure and within which bounds. Zero in a field means its default; fields marked "required" have none.
+ *
+ * Positions are motor positions in load units (mm). Torque fields are in N·m whatever `torque_unit` says.
+ */
+typedef struct gib_backlash_config {
+    /**
+     * Size of this struct as the caller knows it: `sizeof(gib_backlash_config)`. Required.
+     */
+    uint32_t struct_size;
+    /**
+     * `GIB_BACKLASH_SLOW_FEED` (default) or `GIB_BACKLASH_STEP`.
+     */
+    int32_t mode;
+    /**
+     * `GIB_BACKLASH_FIT` (default) or `GIB_BACKLASH_PEAK`: which estimate is written. Both are reported.
+     */
+    int32_t method;
+    /**
+     * Sense of the motion before the first reversal: +1 (default) or -1.
+     */
+    int32_t first_direction;
+    /**
+     * 0: measure the reversals of both senses (default). 1: only the first.
+     */
+    int32_t one_direction;
+    /**
+     * Reversals measured in each sense, 1 to 20 (default 3).
+     */
+    int32_t repeats;
+    /**
+     * Unit of the torque input: `GIB_TORQUE_NM` (default) or `GIB_TORQUE_PERMILLE` of `rated_torque_nm`.
+     */
+    int32_t torque_unit;
+    /**
+     * 0: write the compensation when the result is trustworthy (default). 1: only measure.
+     */
+    int32_t measure_only;
+    /**
+     * 0: both reversals are at the position where the axis stands at start (default). 1: at the `reference_…` fields.
+     */
+    int32_t references_given;
+    /**
+     * Must be 0.
+     */
+    int32_t reserved;
+    /**
+     * Servo period, 0.00005 to 0.02 s. Required.
+     */
+    double cycle_s;
+    /**
+     * Motor step, and travel between two points of the peak rule, 0.1 to 50 µm (default 1).
+     */
+    double step_um;
+    /**
+     * Time a step is held, 2 cycles to 1 s (default 0.02). The torque is read in its last quarter.
+     */
+    double dwell_s;
+    /**
+     * Speed of the slow feed, 0.001 to 5 mm/s (default 0.1).
+     */
+    double feed_mm_s;
+    /**
+     * Rest before each reversal, up to 10 s (default 0.2).
+     */
+    double settle_s;
+    /**
+     * Reversal position of the first sense, mm.
+     */
+    double reference_1_mm;
+    /**
+     * Reversal position of the second sense, mm.
+     */
+    double reference_2_mm;
+    /**
+     * Travel after a reversal within which the table must move, up to 5000 µm (default 500).
+     */
+    double detection_limit_um;
+    /**
+     * Speed of moves between references, 0.1 to 500 mm/s (default 5).
+     */
+    double approach_speed_mm_s;
+    /**
+     * Speed at which the sliding torque is read, 0.05 to 20 mm/s (default 1).
+     */
+    double slide_speed_mm_s;
+    /**
+     * Travel over which the sliding torque is read, 0.1 to 100 mm (default 1).
+     */
+    double slide_mm;
+    /**
+     * Largest commanded acceleration, 0.1 to 10000 mm/s² (default 50).
+     */
+    double acceleration_mm_s2;
+    /**
+     * Lowest motor position allowed, mm. Required, with `travel_max_mm`.
+     */
+    double travel_min_mm;
+    /**
+     * Highest motor position allowed, mm. Required.
+     */
+    double travel_max_mm;
+    /**
+     * Largest |torque| allowed, N·m. Required.
+     */
+    double torque_bound_nm;
+    /**
+     * Rated torque, N·m. Required for `GIB_TORQUE_PERMILLE`.
+     */
+    double rated_torque_nm;
+    /**
+     * Largest |target - position| allowed, up to 100 mm (default 0.5).
+     */
+    double lag_limit_mm;
+    /**
+     * Time within which a request must be acknowledged, 2 cycles to 60 s (default 1).
+     */
+    double ack_timeout_s;
+    /**
+     * Smallest change of the compensation amount that the kernel can store, up to 100 µm (default 1).
+     */
+    double compensation_resolution_um;
+    /**
+     * Largest amount that may be written, up to 5000 µm (default: the detection limit).
+     */
+    double compensation_max_um;
+    /**
+     * Resolution of the motor encoder, up to 100 µm (default: measured as the smallest change seen).
+     */
+    double encoder_um;
+} gib_backlash_config;
+/**
+ * Size of the struct in the first published ABI.
+ */
+#define gib_backlash_config_FIRST_SIZE 208
+
+/**
+ * What the kernel tells gib in a cycle.
+ */
+typedef struct gib_backlash_input {
+    /**
+     * Motor position in load units, mm, without any compensation in it.
+     */
+    double position_mm;
+    /**
+     * Motor torque, positive toward positive positions, in the unit that the configuration names.
+     */
+    double torque;
+    /**
+     * Compensation amount in force in the kernel now, µm.
+     */
+    double compensation_um;
+    /**
+     * `request_id` of the last request that the kernel has carried out; 0 before the first.
+     */
+    uint32_t acknowledged_id;
+    /**
+     * `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`; other bits must be 0.
+     */
+    uint32_t flags;
+} gib_backlash_input;
+
+/**
+ * What gib asks of the kernel in a cycle. Always written, and safe, also when the call returns an error.
+ */
+typedef struct gib_backlash_output {
+    /**
+     * Commanded motor position, mm. To be followed while `owns_motion` is 1.
+     */
+    double target_position_mm;
+    /**
+     * Commanded speed, mm/s, signed.
+     */
+    double target_speed_mm_s;
+    /**
+     * Compensation amount that the kernel shall put in force, µm. Valid once `request_id` is not 0.
+     */
+    double compensation_um;
+    /**
+     * Way left in the present move, mm.
+     */
+    double remaining_mm;
+    /**
+     * Share of the measurement done, 0 to 1.
+     */
+    double progress_ratio;
+    /**
+     * What the step returned: `GIB_OK`, `GIB_BUSY`, `GIB_DONE` or the first error.
+     */
+    int32_t status;
+    /**
+     * One of the `GIB_BACKLASH_…` phases.
+     */
+    int32_t phase;
+    /**
+     * Message number: 0, or the error to tell the operator about; its text is `gib_status_text`.
+     */
+    int32_t message;
+    /**
+     * 1 while gib commands the axis, else 0.
+     */
+    int32_t owns_motion;
+    /**
+     * 1: the kernel shall keep reversal acceleration off. 0: as it is configured there.
+     */
+    int32_t reversal_acceleration_off;
+    /**
+     * Number of the request above: when it changes, put `compensation_um` and `reversal_acceleration_off` in
+     * force, then give the number back in `acknowledged_id`. 0: no request was made yet.
+     */
+    uint32_t request_id;
+} gib_backlash_output;
+
+/**
+ * Lost motion of one sense, or the mean of both. Lost motion is estimated from torque: it is not the reversal
+ * value of ISO 230-2. Lengths in µm; uncertainties are expanded, k = 2.
+ */
+typedef struct gib_backlash_estimate {
+    /**
+     * Lost motion between steady slow motion one way and the other: clearance + 2·Ts/k.
+     */
+    double lost_motion_um;
+    /**
+     * Its expanded uncertainty, k = 2.
+     */
+    double uncertainty_um;
+    /**
+     * Part of it that is clearance.
+     */
+    double clearance_um;
+    /**
+     * Part of it that is elastic wind-up, 2·Ts/k.
+     */
+    double windup_um;
+    /**
+     * Lost motion at standstill, clearance + (|TA+| + |TA-|)/k: what a laser at rest sees.
+     */
+    double standstill_um;
+    /**
+     * Standard deviation over the repeats; 0 with one repeat.
+     */
+    double spread_um;
+    /**
+     * What the published peak rule reads on the same curves; 0 where it found no peak.
+     */
+    double peak_um;
+    /**
+     * Stiffness of the drive at the motor, N·m/mm, and its standard uncertainty.
+     */
+    double stiffness_nm_mm;
+    /**
+     * Standard uncertainty of the stiffness, N·m/mm.
+     */
+    double stiffness_error_nm_mm;
+    /**
+     * Sliding friction, half the change of torque between the two senses, N·m.
+     */
+    double sliding_nm;
+    /**
+     * Part of it that acts on the motor's side and winds nothing up, N·m.
+     */
+    double motor_friction_nm;
+    /**
+     * Standard deviation of one torque sample about the fitted curve, N·m.
+     */
+    double noise_nm;
+    /**
+     * Reversals measured.
+     */
+    int32_t reversals;
+    /**
+     * Reversals in which the peak rule found a peak.
+     */
+    int32_t peaks;
+    /**
+     * Motor steps (points of the curve) taken in all.
+     */
+    int32_t steps;
+    /**
+     * Reversals whose residuals show structure: the curve is not quite the model's.
+     */
+    int32_t structured;
+} gib_backlash_estimate;
+
+/**
+ * What a measurement found and what became of it.
+ */
+typedef struct gib_backlash_report {
+    /**
+     * After motion in the first direction, then in the other; all zero where not measured.
+     */
+    struct gib_backlash_estimate each[2];
+    /**
+     * Mean of both, or the first alone with `one_direction`.
+     */
+    struct gib_backlash_estimate mean;
+    /**
+     * Amount in force when the measurement began, µm.
+     */
+    double old_value_um;
+    /**
+     * Amount that gib asked the kernel to put in force, µm; 0 when none was written.
+     */
+    double value_written_um;
+    /**
+     * Amount that the kernel reported in force at the last confirmed request, µm.
+     */
+    double value_active_um;
+    /**
+     * `GIB_DONE`, `GIB_BUSY`, `GIB_OK` before a start, or the first error.
+     */
+    int32_t status;
+    /**
+     * `GIB_BACKLASH_FIT` or `GIB_BACKLASH_PEAK`: which estimate is written.
+     */
+    int32_t method;
+    /**
+     * `GIB_BACKLASH_SLOW_FEED` or `GIB_BACKLASH_STEP`.
+     */
+    int32_t mode;
+    /**
+     * 1 when a new amount was written and confirmed.
+     */
+    int32_t written;
+    /**
+     * 1 while a restore is owed that the kernel has not confirmed.
+     */
+    int32_t restore_owed;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
+} gib_backlash_report;
+
+/**
+ * The estimate beside a value measured otherwise.
+ */
+typedef struct gib_backlash_comparison {
+    /**
+     * Estimate minus measured value, µm, moving: clearance + 2·Ts/k.
+     */
+    double difference_um;
+    /**
+     * Standstill estimate minus measured value, µm: what fits a measurement at rest.
+     */
+    double standstill_difference_um;
+    /**
+     * Expanded uncertainty of the difference, k = 2, µm.
+     */
+    double uncertainty_um;
+    /**
+     * |difference| ÷ its uncertainty (the En number): 1 or less means the two agree.
+     */
+    double en_ratio;
+} gib_backlash_comparison;
+
+/**
+ * The first error of an instance, in full.
+ */
+typedef struct gib_error_detail {
+    /**
+     * One of the `GIB_ERR_…` numbers, or `GIB_OK` when nothing went wrong.
+     */
+    int32_t code;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
+    /**
+     * Name of the field or input at fault; empty when no single one is. Static text, never NULL.
+     */
+    const char *field;
+    /**
+     * The value found.
+     */
+    double value;
+    /**
+     * Smallest value allowed.
+     */
+    double low;
+    /**
+     * Largest value allowed.
+     */
+    double high;
+} gib_error_detail;
 
 /**
  * All functions of the library, each named as in this header without its `gib_`.
@@ -242,6 +753,68 @@ typedef struct gib_api_table {
      * See gib_status_text.
      */
     const char *(*status_text)(int32_t status);
+    /**
+     * See gib_backlash_size.
+     */
+    uintptr_t (*backlash_size)(void);
+    /**
+     * See gib_backlash_init_in.
+     */
+    int32_t (*backlash_init_in)(void *memory, uintptr_t size, struct gib_backlash **out);
+    /**
+     * See gib_backlash_new.
+     */
+    struct gib_backlash *(*backlash_new)(void);
+    /**
+     * See gib_backlash_free.
+     */
+    void (*backlash_free)(struct gib_backlash *handle);
+    /**
+     * See gib_backlash_start.
+     */
+    int32_t (*backlash_start)(struct gib_backlash *handle, const struct gib_backlash_config *config);
+    /**
+     * See gib_backlash_step.
+     */
+    int32_t (*backlash_step)(struct gib_backlash *handle,
+                             const struct gib_backlash_input *input,
+                             struct gib_backlash_output *output);
+    /**
+     * See gib_backlash_abort.
+     */
+    int32_t (*backlash_abort)(struct gib_backlash *handle);
+    /**
+     * See gib_backlash_restore.
+     */
+    int32_t (*backlash_restore)(struct gib_backlash *handle);
+    /**
+     * See gib_backlash_enable.
+     */
+    int32_t (*backlash_enable)(struct gib_backlash *handle, int32_t on);
+    /**
+     * See gib_backlash_result.
+     */
+    int32_t (*backlash_result)(const struct gib_backlash *handle, struct gib_backlash_report *report);
+    /**
+     * See gib_backlash_curve.
+     */
+    int32_t (*backlash_curve)(const struct gib_backlash *handle,
+                              int32_t sense,
+                              double *travel_um,
+                              double *torque_nm,
+                              uintptr_t capacity,
+                              uintptr_t *count);
+    /**
+     * See gib_backlash_compare.
+     */
+    int32_t (*backlash_compare)(struct gib_backlash *handle,
+                                double measured_um,
+                                double uncertainty_um,
+                                struct gib_backlash_comparison *comparison);
+    /**
+     * See gib_backlash_last_error.
+     */
+    int32_t (*backlash_last_error)(const struct gib_backlash *handle, struct gib_error_detail *detail);
 } gib_api_table;
 
 #ifdef __cplusplus
@@ -275,6 +848,215 @@ const char *gib_version(void);
  * [thread: any] [real-time: yes] [state: any]
  */
 const char *gib_status_text(int32_t status);
+
+/**
+ * Bytes that an instance needs in memory of your own, to be aligned to 16.
+ *
+ * @return the size in bytes, about 110 KiB.
+ *
+ * [thread: any] [real-time: yes] [state: any]
+ */
+uintptr_t gib_backlash_size(void);
+
+/**
+ * Makes an idle instance in memory of your own. There is nothing to free; zero or reuse the memory when done.
+ *
+ * @param memory at least `gib_backlash_size()` bytes, aligned to 16; stays yours.
+ * @param size bytes at `memory`.
+ * @param out receives the handle; NULL on error.
+ * @return GIB_OK; GIB_ERR_NULL; GIB_ERR_MEMORY when too small or misaligned.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ *
+ * # Safety
+ * `memory` is NULL or points to `size` writable bytes; `out` is NULL or writable.
+ */
+int32_t gib_backlash_init_in(void *memory, uintptr_t size, struct gib_backlash **out);
+
+/**
+ * Makes an idle instance in memory that gib allocates.
+ *
+ * @return the handle, to be given to `gib_backlash_free`; NULL when there is no memory.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ */
+struct gib_backlash *gib_backlash_new(void);
+
+/**
+ * Frees an instance made by `gib_backlash_new`. NULL is allowed and does nothing.
+ *
+ * Abort a running measurement and step it to its end first: memory that is gone can restore nothing.
+ *
+ * @param handle an instance from `gib_backlash_new`, never one from `gib_backlash_init_in`.
+ *
+ * [thread: setup] [real-time: no] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or came from `gib_backlash_new` and was not freed before.
+ */
+void gib_backlash_free(struct gib_backlash *handle);
+
+/**
+ * Checks the configuration and arms a measurement, which begins with the next step.
+ *
+ * The rising edge of PLCopen's Execute. Clears the previous result and error. The old compensation amount is read
+ * from `compensation_um` of the first step's input.
+ *
+ * @param handle the instance.
+ * @param config what to measure; copied. Set `struct_size`, zero the rest, then set what you want.
+ * @return GIB_OK; GIB_ERR_CONFIG (gib_backlash_last_error names the field and its range), GIB_ERR_STRUCT_SIZE,
+ * GIB_ERR_STATE while busy, GIB_ERR_DISABLED, GIB_ERR_RESTORE_UNCONFIRMED while a restore is still owed,
+ * GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup, or cycle between steps] [real-time: yes] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `config` is NULL or points to its `struct_size` readable bytes.
+ */
+int32_t gib_backlash_start(struct gib_backlash *handle,
+                           const struct gib_backlash_config *config);
+
+/**
+ * One servo cycle. Call it in every cycle, also when idle: requests are made and restored through it.
+ *
+ * While `owns_motion` is 1, follow `target_position_mm` and report the motor's position and torque of the same
+ * instant. When `request_id` changes, put `compensation_um` and `reversal_acceleration_off` in force and report the
+ * number in `acknowledged_id` and the amount in force in `compensation_um`.
+ *
+ * @param handle the instance.
+ * @param input measured values of this cycle.
+ * @param output commands for this cycle; always written when not NULL.
+ * @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
+ * GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_ACK_TIMEOUT, GIB_ERR_TORQUE_BOUND,
+ * GIB_ERR_TRAVEL_BOUND, GIB_ERR_DEADLINE, GIB_ERR_LAG, GIB_ERR_CONFIG, GIB_ERR_DISABLED, GIB_ERR_BACKLASH_...;
+ * and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `input` is NULL or readable; `output` is NULL or writable.
+ */
+int32_t gib_backlash_step(struct gib_backlash *handle,
+                          const struct gib_backlash_input *input,
+                          struct gib_backlash_output *output);
+
+/**
+ * Aborts a running measurement: the next steps brake, restore the old amount and reversal acceleration, and end
+ * with GIB_ERR_ABORTED. Does nothing when not busy. To abort from another thread set `GIB_INPUT_ABORT` in the input.
+ *
+ * @param handle the instance.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance.
+ */
+int32_t gib_backlash_abort(struct gib_backlash *handle);
+
+/**
+ * Asks for the amount that was in force before the last written one: the operator's "restore original".
+ * Keep stepping until the status is GIB_OK again.
+ *
+ * @param handle the instance.
+ * @return GIB_OK; GIB_ERR_STATE while busy, switched off, or when nothing was written; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance.
+ */
+int32_t gib_backlash_restore(struct gib_backlash *handle);
+
+/**
+ * Switches automatic measuring and compensation on or off. Off: a running measurement is aborted and restored, then
+ * the compensation amount is taken out (0) and starts are refused. On: the amount comes back, starts are allowed.
+ *
+ * @param handle the instance.
+ * @param on 1 or 0.
+ * @return GIB_OK; GIB_ERR_STATE when it is so already or the last switching is not yet confirmed; GIB_ERR_CONFIG
+ * for another value of `on`; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance.
+ */
+int32_t gib_backlash_enable(struct gib_backlash *handle,
+                            int32_t on);
+
+/**
+ * Reads what was found: complete after GIB_DONE, else what is known so far.
+ *
+ * @param handle the instance.
+ * @param report receives it.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `report` is NULL or writable.
+ */
+int32_t gib_backlash_result(const struct gib_backlash *handle, struct gib_backlash_report *report);
+
+/**
+ * Reads the torque curve of the last reversal of a sense, for a graph.
+ *
+ * @param handle the instance.
+ * @param sense 0: after motion in the first direction; 1: after motion in the other.
+ * @param travel_um receives the motor's travel since the reversal, µm, rising.
+ * @param torque_nm receives the torque, N·m, positive in the sense of the scan.
+ * @param capacity points that both arrays can hold; 1024 always suffices.
+ * @param count receives the number of points written, or needed when GIB_ERR_BUFFER is returned.
+ * @return GIB_OK; GIB_ERR_BUFFER; GIB_ERR_CONFIG for another sense; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: no] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; the arrays are NULL or hold `capacity` numbers; `count` is NULL or writable.
+ */
+int32_t gib_backlash_curve(const struct gib_backlash *handle,
+                           int32_t sense,
+                           double *travel_um,
+                           double *torque_nm,
+                           uintptr_t capacity,
+                           uintptr_t *count);
+
+/**
+ * Compares the estimate with a value measured otherwise, for instance the reversal value of ISO 230-2.
+ *
+ * The two are not the same quantity: ISO 230-2 measures positions at standstill, see `standstill_um`.
+ *
+ * @param handle the instance, after a result.
+ * @param measured_um the measured value, µm.
+ * @param uncertainty_um its expanded uncertainty (k = 2), µm, 0 or more.
+ * @param comparison receives the differences.
+ * @return GIB_OK; GIB_ERR_STATE before a result; GIB_ERR_CONFIG for values that are not finite or negative;
+ * GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: after a result]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `comparison` is NULL or writable.
+ */
+int32_t gib_backlash_compare(struct gib_backlash *handle,
+                             double measured_um,
+                             double uncertainty_um,
+                             struct gib_backlash_comparison *comparison);
+
+/**
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ *
+ * @param handle the instance.
+ * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `detail` is NULL or writable.
+ */
+int32_t gib_backlash_last_error(const struct gib_backlash *handle, struct gib_error_detail *detail);
 
 /**
  * The table of all functions, so that `dlsym` needs one name: "gib_api".

@@ -4,8 +4,13 @@
 //! what a library has. A function is one line in the struct and one in the table; the compiler compares the
 //! signatures, and `tests/header.rs` fails when an exported function is not here.
 
+use super::backlash::*;
+use super::types::GibErrorDetail;
 use super::{GIB_ABI_VERSION, gib_abi_version, gib_status_text, gib_version};
-use core::ffi::c_char;
+use crate::cycle::backlash::config::BacklashConfig;
+use crate::cycle::backlash::io::{BacklashInput, BacklashOutput};
+use crate::cycle::backlash::verdict::{BacklashComparison, BacklashReport};
+use core::ffi::{c_char, c_void};
 
 /// All functions of the library, each named as in this header without its `gib_`.
 ///
@@ -23,6 +28,46 @@ pub struct GibApiTable {
     pub version: extern "C" fn() -> *const c_char,
     /// See gib_status_text.
     pub status_text: extern "C" fn(status: i32) -> *const c_char,
+
+    /// See gib_backlash_size.
+    pub backlash_size: extern "C" fn() -> usize,
+    /// See gib_backlash_init_in.
+    pub backlash_init_in: unsafe extern "C" fn(memory: *mut c_void, size: usize, out: *mut *mut GibBacklash) -> i32,
+    /// See gib_backlash_new.
+    pub backlash_new: extern "C" fn() -> *mut GibBacklash,
+    /// See gib_backlash_free.
+    pub backlash_free: unsafe extern "C" fn(handle: *mut GibBacklash),
+    /// See gib_backlash_start.
+    pub backlash_start: unsafe extern "C" fn(handle: *mut GibBacklash, config: *const BacklashConfig) -> i32,
+    /// See gib_backlash_step.
+    pub backlash_step:
+        unsafe extern "C" fn(handle: *mut GibBacklash, input: *const BacklashInput, output: *mut BacklashOutput) -> i32,
+    /// See gib_backlash_abort.
+    pub backlash_abort: unsafe extern "C" fn(handle: *mut GibBacklash) -> i32,
+    /// See gib_backlash_restore.
+    pub backlash_restore: unsafe extern "C" fn(handle: *mut GibBacklash) -> i32,
+    /// See gib_backlash_enable.
+    pub backlash_enable: unsafe extern "C" fn(handle: *mut GibBacklash, on: i32) -> i32,
+    /// See gib_backlash_result.
+    pub backlash_result: unsafe extern "C" fn(handle: *const GibBacklash, report: *mut BacklashReport) -> i32,
+    /// See gib_backlash_curve.
+    pub backlash_curve: unsafe extern "C" fn(
+        handle: *const GibBacklash,
+        sense: i32,
+        travel_um: *mut f64,
+        torque_nm: *mut f64,
+        capacity: usize,
+        count: *mut usize,
+    ) -> i32,
+    /// See gib_backlash_compare.
+    pub backlash_compare: unsafe extern "C" fn(
+        handle: *mut GibBacklash,
+        measured_um: f64,
+        uncertainty_um: f64,
+        comparison: *mut BacklashComparison,
+    ) -> i32,
+    /// See gib_backlash_last_error.
+    pub backlash_last_error: unsafe extern "C" fn(handle: *const GibBacklash, detail: *mut GibErrorDetail) -> i32,
 }
 
 static API: GibApiTable = GibApiTable {
@@ -32,6 +77,20 @@ static API: GibApiTable = GibApiTable {
     abi_version: gib_abi_version,
     version: gib_version,
     status_text: gib_status_text,
+
+    backlash_size: gib_backlash_size,
+    backlash_init_in: gib_backlash_init_in,
+    backlash_new: gib_backlash_new,
+    backlash_free: gib_backlash_free,
+    backlash_start: gib_backlash_start,
+    backlash_step: gib_backlash_step,
+    backlash_abort: gib_backlash_abort,
+    backlash_restore: gib_backlash_restore,
+    backlash_enable: gib_backlash_enable,
+    backlash_result: gib_backlash_result,
+    backlash_curve: gib_backlash_curve,
+    backlash_compare: gib_backlash_compare,
+    backlash_last_error: gib_backlash_last_error,
 };
 
 /// The table of all functions, so that `dlsym` needs one name: "gib_api".

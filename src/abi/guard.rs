@@ -1,6 +1,6 @@
 //! The one door between C and Rust: catches panics, checks pointers and `struct_size`.
 
-use crate::error::{GIB_ERR_INTERNAL, GIB_ERR_NULL, GIB_ERR_STRUCT_SIZE};
+use crate::error::{GIB_ERR_HANDLE, GIB_ERR_INTERNAL, GIB_ERR_MEMORY, GIB_ERR_NULL, GIB_ERR_STRUCT_SIZE, GIB_OK};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Runs setup-side code; a panic becomes `GIB_ERR_INTERNAL`. Never used under a `_step`, which cannot panic.
@@ -45,5 +45,99 @@ pub unsafe fn versioned<T: Copy>(pointer: *const T, first_size: usize) -> Result
     unsafe {
         core::ptr::copy_nonoverlapping(bytes, value.as_mut_ptr().cast::<u8>(), known);
         Ok(value.assume_init())
+    }
+}
+
+/// A type that C holds by an opaque handle.
+pub trait Instance: Sized {
+    /// Mark of a living instance.
+    const ALIVE: u64;
+    /// The mark in this memory.
+    fn alive(&self) -> u64;
+    /// An idle instance.
+    fn new() -> Self;
+    /// Takes the mark away, so that a later call is refused instead of trusted.
+    fn bury(&mut self);
+}
+
+/// The instance behind a handle.
+///
+/// # Safety
+/// `handle` is NULL or points to readable memory of the type's size and alignment.
+///
+/// # Errors
+/// `GIB_ERR_NULL`, `GIB_ERR_HANDLE`.
+pub unsafe fn instance<'a, T: Instance>(handle: *const T) -> Result<&'a T, i32> {
+    // SAFETY: the caller's promise.
+    let instance = unsafe { handle.as_ref() }.ok_or(GIB_ERR_NULL)?;
+    if instance.alive() == T::ALIVE { Ok(instance) } else { Err(GIB_ERR_HANDLE) }
+}
+
+/// The instance behind a handle, to be changed.
+///
+/// # Safety
+/// As [`instance`], and nothing else uses it during the call.
+///
+/// # Errors
+/// `GIB_ERR_NULL`, `GIB_ERR_HANDLE`.
+pub unsafe fn instance_mut<'a, T: Instance>(handle: *mut T) -> Result<&'a mut T, i32> {
+    // SAFETY: the caller's promise.
+    let instance = unsafe { handle.as_mut() }.ok_or(GIB_ERR_NULL)?;
+    if instance.alive() == T::ALIVE { Ok(instance) } else { Err(GIB_ERR_HANDLE) }
+}
+
+/// Makes an instance in the caller's memory.
+///
+/// # Safety
+/// `memory` is NULL or `size` writable bytes; `out` is NULL or writable.
+///
+/// # Errors
+/// `GIB_ERR_NULL`, `GIB_ERR_MEMORY`.
+pub unsafe fn placed<T: Instance>(memory: *mut core::ffi::c_void, size: usize, out: *mut *mut T) -> Result<i32, i32> {
+    if out.is_null() {
+        return Err(GIB_ERR_NULL);
+    }
+    // SAFETY: not NULL, so writable.
+    unsafe { out.write(core::ptr::null_mut()) };
+    if memory.is_null() {
+        return Err(GIB_ERR_NULL);
+    }
+    let place = memory.cast::<T>();
+    if size < size_of::<T>() || !place.is_aligned() {
+        return Err(GIB_ERR_MEMORY);
+    }
+    // SAFETY: large enough, aligned, writable by the caller's promise.
+    unsafe {
+        place.write(T::new());
+        out.write(place);
+    }
+    Ok(GIB_OK)
+}
+
+/// Makes an instance in memory from the allocator; NULL when there is none.
+pub fn allocated<T: Instance>() -> *mut T {
+    let layout = std::alloc::Layout::new::<T>();
+    let mut handle = core::ptr::null_mut();
+    // SAFETY: the layout of an instance is not empty.
+    let memory = unsafe { std::alloc::alloc(layout) };
+    // SAFETY: memory of that layout, or NULL, which `placed` refuses.
+    let status = guarded(|| unsafe { placed(memory.cast(), layout.size(), &raw mut handle) });
+    if status != GIB_OK && !memory.is_null() {
+        // SAFETY: allocated above with this layout and not handed out.
+        unsafe { std::alloc::dealloc(memory, layout) };
+    }
+    handle
+}
+
+/// Frees an instance from [`allocated`].
+///
+/// # Safety
+/// `handle` is NULL or came from `allocated` and was not released before.
+pub unsafe fn release<T: Instance>(handle: *mut T) {
+    // SAFETY: the caller's promise.
+    if let Ok(instance) = unsafe { instance_mut(handle) } {
+        instance.bury();
+        // SAFETY: `allocated` used this layout; instances are plain data with nothing to drop.
+        unsafe { std::alloc::dealloc(handle.cast(), std::alloc::Layout::new::<T>()) };
     }
 }

@@ -6,7 +6,9 @@
 //! To add a family: one file here, one block of pointers in `api.rs`.
 
 pub mod api;
+pub mod backlash;
 pub mod guard;
+pub mod types;
 
 use crate::error::status_text;
 use core::ffi::c_char;

@@ -88,15 +88,22 @@ impl Curve {
     }
 }
 
-/// Weighted sums over a stretch of the curve: Σn, Σn·s, Σn·s², Σn·τ, Σn·s·τ, Σn·τ², and the number of bins.
+/// Weighted sums over a stretch of the curve; n counts the samples of a bin.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Moments {
+    /// Σn.
     pub n: f64,
+    /// Σn·s.
     pub s: f64,
+    /// Σn·s².
     pub ss: f64,
+    /// Σn·τ.
     pub t: f64,
+    /// Σn·s·τ.
     pub st: f64,
+    /// Σn·τ².
     pub tt: f64,
+    /// Number of bins.
     pub bins: f64,
 }
 

@@ -48,8 +48,9 @@ impl Levels {
 /// The fitted curve and what follows from it. Lengths in mm, torques in the curve's unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Fitted {
-    /// Lost motion and its variance (mm²).
+    /// Lost motion.
     pub lost_motion: f64,
+    /// Its variance, mm².
     pub variance: f64,
     /// Clearance s2 − s1.
     pub clearance: f64,
@@ -57,8 +58,9 @@ pub struct Fitted {
     pub windup: f64,
     /// Travel from the reversal to the clearance: the wind-up that was still held at standstill.
     pub held: f64,
-    /// Stiffness k and its standard error.
+    /// Stiffness k.
     pub stiffness: f64,
+    /// Standard error of k.
     pub stiffness_error: f64,
     /// Torque across the clearance.
     pub level: f64,
@@ -71,7 +73,7 @@ pub struct Fitted {
 }
 
 /// Shares of the wind-up tried, largest first.
-const SHARES: [f64; 4] = [0.85, 0.7, 0.55, 0.4];
+const SHARES: [f64; 3] = [0.65, 0.5, 0.35];
 /// Grid points for each kink.
 const GRID: usize = 24;
 /// Trials in one slice of the search.
@@ -252,7 +254,11 @@ impl Fit {
 
     /// Best c and k for given kinks.
     fn trial(&self, curve: &Curve, s1: f64, s2: f64) -> Trial {
+        const FEWEST_BINS: f64 = 3.0; // on each slope, or the kink beside it means nothing
         let (a, b, all) = self.parts(curve, s1, s2);
+        if s2 > s1 && a.bins.min(b.bins) < FEWEST_BINS {
+            return NO_TRIAL;
+        }
         let g = (a.s - s1 * a.n) + (b.s - s2 * b.n);
         let gg = (a.ss - 2.0 * s1 * a.s + s1 * s1 * a.n) + (b.ss - 2.0 * s2 * b.s + s2 * s2 * b.n);
         let gt = (a.st - s1 * a.t) + (b.st - s2 * b.t);
@@ -385,23 +391,23 @@ impl Fit {
 
     /// Lost motion and its variance from the fitted kinks, slope and levels.
     fn derive(&self, curve: &Curve, noise: f64, inflation: f64, structured: bool) -> Option<Fitted> {
-        let t = self.best;
+        let mut t = self.best;
         let change = self.levels.spring_change();
-        let (matrix, _) = self.normal(curve, &t);
+        if t.s2 - t.s1 < curve.width_mm() {
+            // One straight line: only its slope is known, and the kink lies where the spring's torque passes zero.
+            let zero = 0.5 * (self.levels.before + self.levels.after) + self.levels.motor;
+            let middle = 0.5 * (t.s1 + t.s2) + (zero - t.c) / t.k;
+            t = Trial { s1: middle, s2: middle, c: zero, ..t };
+        }
+        // Kinks that meet leave their distance open: its uncertainty is that of kinks a tenth of the stretch apart.
+        let apart = 0.5 * (0.1 * (self.end - self.first) as f64 * curve.width_mm() - (t.s2 - t.s1)).max(0.0);
+        let (matrix, _) = self.normal(curve, &Trial { s1: t.s1 - apart, s2: t.s2 + apart, ..t });
         let scale = noise * inflation;
         // d(lost motion)/d(c, k, s1, s2); the levels come from other samples.
         let gradient = [0.0, -change / (t.k * t.k), -1.0, 1.0];
-        let (fit_variance, k_variance) = if t.s2 - t.s1 > curve.width_mm() {
-            let weights = solve(matrix, gradient)?;
-            let lost: f64 = weights.iter().zip(gradient).map(|(w, g)| w * g).sum();
-            let unit = solve(matrix, [0.0, 1.0, 0.0, 0.0])?;
-            (lost * scale, unit[1] * scale)
-        } else {
-            // No clearance is resolved: the curve is one straight line, and only its slope counts.
-            let all = self.running(self.end).since(self.running(self.first));
-            let k_variance = scale / (all.ss - all.s * all.s / all.n);
-            (k_variance * gradient[1] * gradient[1], k_variance)
-        };
+        let weights = solve(matrix, gradient)?;
+        let fit_variance = scale * weights.iter().zip(gradient).map(|(w, g)| w * g).sum::<f64>();
+        let k_variance = scale * solve(matrix, [0.0, 1.0, 0.0, 0.0])?[1];
         let windup = change / t.k;
         let clearance = t.s2 - t.s1;
         let variance = fit_variance + self.levels.variance / (t.k * t.k);

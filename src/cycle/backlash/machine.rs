@@ -1,7 +1,7 @@
 //! The state machine of a lost-motion measurement: one call per servo cycle.
 //!
 //! ```text
-//! Idle → Begin → Clear → for each reversal (Approach → SlideBack → SlideIn → Settle → Scan → ProbeBack → ProbeForth →
+//! Idle → Begin → Clear → for each reversal (Approach → SlideBack → SlideIn → Settle → Scan → Unwind → ProbeBack → Unwind → ProbeForth →
 //!                                   Evaluate) → Write → Done
 //!          any state ──fault, abort, deadline, refusal──▶ leave: Stopping → Restore → Failed
 //! ```
@@ -10,12 +10,12 @@
 //! state is entered; when it runs out the machine leaves. In Failed the restoring request stays on the output, so
 //! that a kernel which comes back late still sees it.
 
-use super::config::Plan;
-use super::curve::Curve;
+use super::curve::{Curve, Moments};
 use super::fit::{Fit, Levels};
 use super::io::*;
 use super::peak::Peak;
-use super::verdict::{BacklashEstimate, Sense};
+use super::plan::Plan;
+use super::verdict::{BacklashEstimate, BacklashReport, Sense};
 use crate::cycle::level::Level;
 use crate::cycle::profile::Profile;
 use crate::error::*;
@@ -41,6 +41,8 @@ enum Phase {
     Settle,
     /// Ends when the torque no longer grows.
     Scan,
+    /// Ends when the command is back where the motor is: the servo's lag must not drive the motor on after a turn.
+    Unwind { forth: bool },
     /// Ends when the motor has gone `depth` back.
     ProbeBack,
     /// Ends when the motor has come forth again.
@@ -89,17 +91,17 @@ struct Watch {
     margin: f64,
     highest: f64,
     highest_at: f64,
-    low_at: f64,
     high_at: f64,
 }
 
-/// Torque of the probe both ways, over the middle of its way.
+/// Torque against way back from `turn`, both ways, over the middle of the probe's depth.
 #[derive(Debug, Clone, Copy, Default)]
 struct Probe {
     turn: f64,
     depth: f64,
-    back: Level,
-    forth: Level,
+    deepest: f64,
+    back: Moments,
+    forth: Moments,
 }
 
 /// A lost-motion measurement of one axis: plain data, no pointers.
@@ -252,6 +254,44 @@ impl Backlash {
     #[must_use]
     pub fn busy(&self) -> bool {
         !matches!(self.phase, Phase::Idle | Phase::Done | Phase::Failed)
+    }
+
+    /// What the last step put out.
+    #[must_use]
+    pub fn output(&self) -> &BacklashOutput {
+        &self.output
+    }
+
+    /// First fault of the present run.
+    #[must_use]
+    pub fn fault(&self) -> Fault {
+        self.fault
+    }
+
+    /// What was found so far, and what became of it.
+    #[must_use]
+    pub fn report(&self) -> BacklashReport {
+        let written = self.phase == Phase::Done && self.written_um.is_some();
+        BacklashReport {
+            each: self.estimates,
+            mean: self.mean,
+            old_value_um: self.old_um.filter(|_| written).unwrap_or(self.fallback_um),
+            value_written_um: self.written_um.unwrap_or(0.0),
+            value_active_um: self.active_um,
+            status: self.output.status,
+            method: i32::from(self.plan.use_peak),
+            mode: i32::from(!self.plan.slow_feed),
+            written: i32::from(written),
+            restore_owed: i32::from(self.changed && self.phase == Phase::Failed),
+            reserved: 0,
+        }
+    }
+
+    /// Points of the last torque curve of a sense: travel in µm, torque in N·m. `None` for a sense beyond 1.
+    pub fn curve(&self, sense: usize) -> Option<impl Iterator<Item = (f64, f64)> + Clone> {
+        let curve = self.curves.get(sense)?;
+        let nm = self.plan.torque_nm;
+        Some((0..curve.used()).filter_map(move |bin| curve.point(bin).map(|(_, s, t)| (s * 1e3, t * nm))))
     }
 
     /// One servo cycle.
@@ -446,7 +486,7 @@ impl Backlash {
             Phase::SlideIn => GIB_BACKLASH_SLIDE_IN,
             Phase::Settle => GIB_BACKLASH_SETTLE,
             Phase::Scan => GIB_BACKLASH_SCAN,
-            Phase::ProbeBack | Phase::ProbeForth => GIB_BACKLASH_PROBE,
+            Phase::Unwind { .. } | Phase::ProbeBack | Phase::ProbeForth => GIB_BACKLASH_PROBE,
             Phase::EvaluatePeak { .. } | Phase::EvaluateFit => GIB_BACKLASH_EVALUATE,
             Phase::Write { .. } => GIB_BACKLASH_WRITE,
             Phase::Stopping => GIB_BACKLASH_STOPPING,

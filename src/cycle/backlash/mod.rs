@@ -9,7 +9,7 @@
 //!
 //! | file | purpose |
 //! |---|---|
-//! | [`config`] | what the caller asks for, checked once |
+//! | [`config`], [`plan`] | what the caller asks for; the same, checked, as constants of a cycle |
 //! | [`io`] | what crosses the boundary in a cycle |
 //! | [`machine`] | the state machine called once per servo cycle |
 //! | [`curve`] | torque against travel |
@@ -22,4 +22,5 @@ pub mod fit;
 pub mod io;
 pub mod machine;
 pub mod peak;
+pub mod plan;
 pub mod verdict;

@@ -4,25 +4,39 @@
 //! Kept for comparison and for `method = peak`. It reads low: at standstill part of the wind-up is already
 //! released, and noise makes the first rise–rise–fall come before the true peak.
 
-/// Rule in progress over one curve.
+use super::curve::Moments;
+
+/// Rule in progress over one curve. The curve's bins are first joined to points one motor step apart.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Peak {
+    step: f64,
+    rise: f64,
+    point: Moments,
+    end: f64,
     torque: [f64; 4],
     travel: f64,
     points: u32,
-    rise: f64,
     found: Option<f64>,
 }
 
 impl Peak {
-    /// Starts the rule; torques below `rise` are not yet the rise of the wind-up.
+    /// Starts the rule with points `step` mm apart; torques below `rise` are not yet the rise of the wind-up.
     #[must_use]
-    pub fn new(rise: f64) -> Peak {
-        Peak { rise, ..Peak::default() }
+    pub fn new(rise: f64, step: f64) -> Peak {
+        Peak { step, rise, end: step, ..Peak::default() }
     }
 
-    /// Adds a point of the curve: travel (mm) and torque in the sense of the motion.
-    pub fn add(&mut self, travel: f64, torque: f64) {
+    /// Adds a bin of the curve: samples, travel (mm) and torque in the sense of the motion; travels rise.
+    pub fn add(&mut self, n: f64, travel: f64, torque: f64) {
+        if travel >= self.end && self.point.n > 0.0 {
+            self.point(self.point.s / self.point.n, self.point.t / self.point.n);
+            self.point = Moments::default();
+            self.end = travel + self.step;
+        }
+        self.point = self.point.with(n, travel, torque);
+    }
+
+    fn point(&mut self, travel: f64, torque: f64) {
         if self.found.is_some() {
             return;
         }
@@ -48,20 +62,20 @@ mod tests {
     use super::*;
 
     fn read(torques: &[f64], rise: f64) -> Option<f64> {
-        let mut peak = Peak::new(rise);
-        torques.iter().enumerate().for_each(|(i, t)| peak.add(i as f64, *t));
+        let mut peak = Peak::new(rise, 1.0);
+        torques.iter().chain([&0.0]).enumerate().for_each(|(i, t)| peak.add(1.0, i as f64 + 0.5, *t));
         peak.found()
     }
 
     #[test]
     fn finds_the_point_before_the_fall() {
-        assert_eq!(read(&[-1.0, 0.0, 1.0, 2.0, 3.0, 2.5, 2.5], 1.0), Some(4.0));
-        assert_eq!(read(&[1.0, 1.0, 1.0, 0.9], 0.5), Some(2.0), "a level rise counts, as printed");
+        assert_eq!(read(&[-1.0, 0.0, 1.0, 2.0, 3.0, 2.5, 2.5], 1.0), Some(4.5));
+        assert_eq!(read(&[1.0, 1.0, 1.0, 0.9], 0.5), Some(2.5), "a level rise counts, as printed");
     }
 
     #[test]
     fn needs_two_rises_and_the_threshold() {
         assert_eq!(read(&[0.0, 0.5, 0.4, 0.5, 0.4], 0.0), None);
-        assert_eq!(read(&[0.0, 0.1, 0.2, 0.1, 0.5, 0.6, 0.7, 0.6], 0.5), Some(6.0));
+        assert_eq!(read(&[0.0, 0.1, 0.2, 0.1, 0.5, 0.6, 0.7, 0.6], 0.5), Some(6.5));
     }
 }

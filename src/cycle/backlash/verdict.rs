@@ -3,11 +3,11 @@
 //! The variance of a mean over n reversals is the larger of what the fits expect and what the repeats show
 //! (Birge's ratio), so that neither a lucky spread nor an optimistic fit makes the uncertainty too small.
 
-use super::config::Plan;
 use super::fit::{Fitted, Levels};
+use super::plan::Plan;
 use crate::error::{
     Fault, GIB_ERR_BACKLASH_DIRECTIONS, GIB_ERR_BACKLASH_LIMIT, GIB_ERR_BACKLASH_NOISE, GIB_ERR_BACKLASH_RESOLUTION,
-    GIB_ERR_BACKLASH_SHAPE,
+    GIB_ERR_BACKLASH_SHAPE, GIB_ERR_STATE, in_range,
 };
 
 /// Lost motion of one sense, or the mean of both. Lost motion is estimated from torque: it is not the reversal
@@ -49,6 +49,70 @@ pub struct BacklashEstimate {
     pub structured: i32,
 }
 
+/// What a measurement found and what became of it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct BacklashReport {
+    /// After motion in the first direction, then in the other; all zero where not measured.
+    pub each: [BacklashEstimate; 2],
+    /// Mean of both, or the first alone with `one_direction`.
+    pub mean: BacklashEstimate,
+    /// Amount in force when the measurement began, µm.
+    pub old_value_um: f64,
+    /// Amount that gib asked the kernel to put in force, µm; 0 when none was written.
+    pub value_written_um: f64,
+    /// Amount that the kernel reported in force at the last confirmed request, µm.
+    pub value_active_um: f64,
+    /// `GIB_DONE`, `GIB_BUSY`, `GIB_OK` before a start, or the first error.
+    pub status: i32,
+    /// `GIB_BACKLASH_FIT` or `GIB_BACKLASH_PEAK`: which estimate is written.
+    pub method: i32,
+    /// `GIB_BACKLASH_SLOW_FEED` or `GIB_BACKLASH_STEP`.
+    pub mode: i32,
+    /// 1 when a new amount was written and confirmed.
+    pub written: i32,
+    /// 1 while a restore is owed that the kernel has not confirmed.
+    pub restore_owed: i32,
+    /// Zero.
+    pub reserved: i32,
+}
+
+/// The estimate beside a value measured otherwise.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct BacklashComparison {
+    /// Estimate minus measured value, µm, moving: clearance + 2·Ts/k.
+    pub difference_um: f64,
+    /// Standstill estimate minus measured value, µm: what fits a measurement at rest.
+    pub standstill_difference_um: f64,
+    /// Expanded uncertainty of the difference, k = 2, µm.
+    pub uncertainty_um: f64,
+    /// |difference| ÷ its uncertainty (the En number): 1 or less means the two agree.
+    pub en_ratio: f64,
+}
+
+impl BacklashReport {
+    /// Compares the mean with a measured value and its expanded uncertainty, both in µm.
+    ///
+    /// # Errors
+    /// `GIB_ERR_STATE` before a result, `GIB_ERR_CONFIG` for a value out of range.
+    pub fn compare(&self, measured_um: f64, uncertainty_um: f64) -> Result<BacklashComparison, Fault> {
+        if self.mean.reversals == 0 {
+            return Err(Fault::of(GIB_ERR_STATE));
+        }
+        let measured = in_range("measured_um\0", measured_um, 0.0, 1e6)?;
+        let other = in_range("uncertainty_um\0", uncertainty_um, 0.0, 1e6)?;
+        let uncertainty = (self.mean.uncertainty_um * self.mean.uncertainty_um + other * other).sqrt();
+        let difference = self.mean.lost_motion_um - measured;
+        Ok(BacklashComparison {
+            difference_um: difference,
+            standstill_difference_um: self.mean.standstill_um - measured,
+            uncertainty_um: uncertainty,
+            en_ratio: difference.abs() / uncertainty.max(f64::MIN_POSITIVE),
+        })
+    }
+}
+
 /// Everything measured so far in one sense.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Sense {
@@ -72,7 +136,7 @@ pub struct Sense {
 
 impl Sense {
     /// Adds a reversal: its fit, its levels, the peak rule's reading (mm) if any, and the points of its curve.
-    pub fn add(&mut self, fit: &Fitted, levels: &Levels, peak: Option<f64>, steps: usize) {
+    pub fn add(&mut self, fit: &Fitted, levels: &Levels, peak: Option<f64>, steps: f64) {
         self.reversals += 1.0;
         self.sum += fit.lost_motion;
         self.squares += fit.lost_motion * fit.lost_motion;
@@ -86,7 +150,7 @@ impl Sense {
         self.motor += levels.motor;
         self.noise += fit.noise;
         self.structured += f64::from(u8::from(fit.structured));
-        self.steps += steps as f64;
+        self.steps += steps;
         if let Some(position) = peak {
             self.peaks += 1.0;
             self.peak_sum += position;
@@ -99,13 +163,12 @@ impl Sense {
         self.reversals
     }
 
-    /// Variance of the mean lost motion, mm²; `encoder` is the grid of the position input in mm.
-    fn variance_of_mean(&self, encoder: f64) -> f64 {
+    /// Variance of the mean lost motion, mm², from scatter and fits.
+    fn variance_of_mean(&self) -> f64 {
         let n = self.reversals.max(1.0);
         let expected = self.variances / n;
         let seen = if n > 1.0 { ((self.squares - self.sum * self.sum / n) / (n - 1.0)).max(0.0) } else { 0.0 };
-        // Each end of the lost motion lies somewhere on the encoder's grid, the same in every repeat.
-        expected.max(seen) / n + encoder * encoder / 6.0
+        expected.max(seen) / n
     }
 
     /// The estimate for this sense; `other` supplies the wind-up held on the far side at standstill.
@@ -117,7 +180,7 @@ impl Sense {
         let nm = plan.torque_nm;
         BacklashEstimate {
             lost_motion_um: self.sum / n * um,
-            uncertainty_um: 2.0 * self.variance_of_mean(encoder).sqrt() * um,
+            uncertainty_um: 2.0 * (self.variance_of_mean() + systematic(plan, encoder)).sqrt() * um,
             clearance_um: clearance * um,
             windup_um: self.windup / n * um,
             standstill_um: (clearance + self.held / n + far) * um,
@@ -140,6 +203,15 @@ impl Sense {
     }
 }
 
+/// Variance that no repetition takes away, mm²: each end of the lost motion lies somewhere on the encoder's grid q,
+/// the same in every repeat (2·q²/12), a kink somewhere in its bin of the curve, and in step mode the motor stands
+/// somewhere in a step when the torque is read.
+fn systematic(plan: &Plan, encoder: f64) -> f64 {
+    const STEP_SHARE: f64 = 0.15;
+    let step = if plan.slow_feed { 0.0 } else { STEP_SHARE * plan.step };
+    encoder * encoder / 6.0 + plan.bin * plan.bin / 24.0 + step * step
+}
+
 /// Estimates of both senses and their mean; a sense that was not measured is all zero.
 #[must_use]
 pub fn estimates(plan: &Plan, encoder: f64, senses: &[Sense; 2]) -> ([BacklashEstimate; 2], BacklashEstimate) {
@@ -150,9 +222,10 @@ pub fn estimates(plan: &Plan, encoder: f64, senses: &[Sense; 2]) -> ([BacklashEs
     let second = senses[1].estimate(plan, encoder, &senses[0]);
     let half = |a: f64, b: f64| 0.5 * (a + b);
     let root = |a: f64, b: f64| 0.5 * (a * a + b * b).sqrt();
+    let scatter = 0.25 * (senses[0].variance_of_mean() + senses[1].variance_of_mean());
     let mean = BacklashEstimate {
         lost_motion_um: half(first.lost_motion_um, second.lost_motion_um),
-        uncertainty_um: root(first.uncertainty_um, second.uncertainty_um),
+        uncertainty_um: 2.0e3 * (scatter + systematic(plan, encoder)).sqrt(),
         clearance_um: half(first.clearance_um, second.clearance_um),
         windup_um: half(first.windup_um, second.windup_um),
         standstill_um: half(first.standstill_um, second.standstill_um),

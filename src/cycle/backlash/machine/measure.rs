@@ -36,13 +36,27 @@ impl Watch {
         if self.smooth > self.highest + self.margin {
             self.highest = self.smooth;
             self.highest_at = travel;
-            if self.low_at == 0.0 && self.smooth > RISE_LOW {
-                self.low_at = travel;
-            }
             if self.high_at == 0.0 && self.smooth > RISE_HIGH {
                 self.high_at = travel;
             }
         }
+    }
+}
+
+impl Probe {
+    /// Twice the motor's friction and its variance: the distance of two parallel lines, torque against way, one for
+    /// each sense. Parallel, since the drive's stiffness is the same both ways; lines, since the motor does not
+    /// pass all places equally fast.
+    fn difference(&self) -> (f64, f64) {
+        let (b, f) = (&self.back, &self.forth);
+        let spread = |m: &Moments| m.ss - m.s * m.s / m.n;
+        let with_way = |m: &Moments| m.st - m.s * m.t / m.n;
+        let slope = (with_way(b) + with_way(f)) / (spread(b) + spread(f));
+        let apart = f.s / f.n - b.s / b.n;
+        let twice = f.t / f.n - b.t / b.n - slope * apart;
+        let rest = |m: &Moments| m.tt - m.t * m.t / m.n - slope * with_way(m);
+        let noise = (rest(b) + rest(f)).max(0.0) / (b.n + f.n - 3.0);
+        (twice, noise * (1.0 / b.n + 1.0 / f.n + apart * apart / (spread(b) + spread(f))))
     }
 }
 
@@ -54,6 +68,11 @@ impl Backlash {
             Phase::Scan => self.scan(input),
             Phase::SlideBack | Phase::SlideIn => self.slide(input),
             Phase::ProbeBack | Phase::ProbeForth => self.probe(input),
+            Phase::Unwind { forth } => {
+                if self.profile.step() {
+                    self.probe_on(input, forth);
+                }
+            }
             Phase::Approach => {
                 if self.profile.step() {
                     self.slide_back();
@@ -159,7 +178,7 @@ impl Backlash {
         let change = self.after.mean() - self.before.mean();
         let error = (self.after.variance_of_mean() + self.before.variance_of_mean()).sqrt();
         const SIGMAS: f64 = 5.0;
-        if !(change.abs() > SIGMAS * error) {
+        if change.abs() <= SIGMAS * error || error.is_infinite() {
             let fault = Fault {
                 code: GIB_ERR_BACKLASH_NOISE,
                 field: "torque\0",
@@ -187,10 +206,10 @@ impl Backlash {
         let index = self.sense_index();
         self.curves[index].start(self.plan.bin);
         if self.plan.slow_feed {
-            let goal = self.turn_command + self.sense * self.plan.limit;
+            let goal = self.turn_command + self.sense * (self.plan.limit + self.plan.lag_limit);
             self.move_to(Phase::Scan, goal, self.plan.feed);
         } else {
-            let steps = self.plan.limit / self.plan.step + 2.0;
+            let steps = (self.plan.limit + self.plan.lag_limit) / self.plan.step + 2.0;
             self.enter(Phase::Scan, steps * f64::from(self.plan.dwell));
         }
     }
@@ -213,7 +232,7 @@ impl Backlash {
             if self.hold == 0 {
                 self.hold = self.plan.dwell;
                 self.profile.position += self.sense * self.plan.step;
-                over = (self.profile.position - self.turn_command).abs() >= self.plan.limit;
+                over = (self.profile.position - self.turn_command).abs() >= self.plan.limit + self.plan.lag_limit;
             }
             if self.hold > self.plan.read_from {
                 return;
@@ -221,28 +240,54 @@ impl Backlash {
         }
         self.curves[usize::from(self.plan.senses == 2) & (self.reversal & 1) as usize].add(travel, torque);
         self.watch.add(travel, torque);
-        let stalled = (STALL_POINTS * self.plan.bin).max(STALL_SHARE * self.watch.highest_at);
+        let stalled = (STALL_POINTS * self.plan.step).max(STALL_SHARE * self.watch.highest_at);
         if self.watch.highest > RISE_LOW && travel > self.watch.highest_at + stalled {
             self.probe_back(input);
-        } else if over {
+        } else if over || travel >= self.plan.limit {
             let code = if self.watch.highest < RISE_LOW { GIB_ERR_BACKLASH_NO_RISE } else { GIB_ERR_BACKLASH_LIMIT };
             let found = self.watch.highest;
             self.leave(Fault { code, field: "detection_limit_um\0", value: found, low: RISE_LOW, high: 1.0 });
         }
     }
 
-    /// Sliding is reached: goes back by about half of the rise, where the table still sticks.
+    /// Sliding is reached: will go back by a share of the way, where the table still sticks.
     #[cold]
     fn probe_back(&mut self, input: &BacklashInput) {
         let high_at = if self.watch.high_at > 0.0 { self.watch.high_at } else { self.watch.highest_at };
-        // The rise from one share to the other is 0.15 of half the change; 2.5 times that stays far from slipping.
-        let depth = (2.5 * (high_at - self.watch.low_at))
-            .clamp(2.0 * self.plan.bin, 0.5 * self.watch.highest_at.max(4.0 * self.plan.bin));
-        let batch = (0.5 * depth / self.plan.feed / 6.0) as u32;
-        self.probe = Probe { turn: input.position_mm, depth, back: Level::new(batch), forth: Level::new(batch) };
-        self.profile.speed = 0.0;
-        let goal = self.profile.position - self.sense * self.plan.limit;
-        self.move_to(Phase::ProbeBack, goal, self.plan.feed);
+        // A quarter of the way so far ends in the wind-up or in the clearance, where the table sticks.
+        let depth = (0.25 * high_at).max(2.0 * self.plan.step);
+        self.probe = Probe { depth, deepest: high_at, ..Probe::default() };
+        self.unwind(input, false);
+    }
+
+    /// Brings the command to where the motor is.
+    fn unwind(&mut self, input: &BacklashInput, forth: bool) {
+        self.move_to(Phase::Unwind { forth }, input.position_mm, self.plan.slide_speed);
+    }
+
+    /// The command has been brought back: goes on with the next way of the probe.
+    #[cold]
+    fn probe_on(&mut self, input: &BacklashInput, forth: bool) {
+        let back = self.sense * (self.probe.turn - input.position_mm);
+        if forth {
+            let deepest = self.probe.deepest;
+            if back > deepest {
+                let field = "position_mm\0";
+                return self.leave(Fault {
+                    code: GIB_ERR_BACKLASH_MOTOR_FRICTION,
+                    field,
+                    value: back,
+                    low: 0.0,
+                    high: deepest,
+                });
+            }
+            let goal = self.turn_command + self.sense * self.plan.reach();
+            self.move_to(Phase::ProbeForth, goal, self.plan.feed);
+        } else {
+            self.probe.turn = input.position_mm;
+            let goal = self.turn_command - self.sense * self.plan.limit.min(self.plan.lag_limit);
+            self.move_to(Phase::ProbeBack, goal, self.plan.feed);
+        }
     }
 
     /// One cycle of the probe. Friction on the motor's side is half the difference of the torque both ways at the
@@ -256,15 +301,14 @@ impl Backlash {
         let torque = self.sense * input.torque;
         if self.phase == Phase::ProbeBack {
             if inside {
-                self.probe.back.add(torque);
+                self.probe.back = self.probe.back.with(1.0, back, torque);
             }
             if back >= depth {
-                let goal = self.turn_command + self.sense * 1.5 * self.plan.limit;
-                return self.move_to(Phase::ProbeForth, goal, self.plan.feed);
+                return self.unwind(input, true);
             }
         } else {
             if inside {
-                self.probe.forth.add(torque);
+                self.probe.forth = self.probe.forth.with(1.0, back, torque);
             }
             if back <= 0.1 * depth {
                 return self.probed();
@@ -286,8 +330,7 @@ impl Backlash {
     fn probed(&mut self) {
         self.profile.goal = self.profile.position;
         self.profile.speed = 0.0;
-        let twice = self.probe.forth.mean() - self.probe.back.mean();
-        let twice_variance = self.probe.forth.variance_of_mean() + self.probe.back.variance_of_mean();
+        let (twice, twice_variance) = self.probe.difference();
         let change = self.after.mean() - self.before.mean();
         let motor = (0.5 * twice).max(0.0);
         // More than half of the friction on the motor's side leaves too little wind-up to see; and a probe that
@@ -295,7 +338,7 @@ impl Backlash {
         const LARGEST_SHARE: f64 = 0.55;
         const WORST_ERROR: f64 = 0.1;
         let share = 2.0 * motor / change;
-        if !(share <= LARGEST_SHARE && twice_variance.sqrt() <= WORST_ERROR * change) {
+        if !(share <= LARGEST_SHARE && twice_variance >= 0.0 && twice_variance.sqrt() <= WORST_ERROR * change) {
             return self.leave(Fault {
                 code: GIB_ERR_BACKLASH_MOTOR_FRICTION,
                 field: "torque\0",
@@ -310,15 +353,15 @@ impl Backlash {
             motor,
             variance: self.before.variance_of_mean() + self.after.variance_of_mean() + twice_variance,
         };
-        self.peak = Peak::new(0.5 * self.after.mean());
+        self.peak = Peak::new(0.5 * self.after.mean(), self.plan.step);
         self.enter(Phase::EvaluatePeak { bin: 0 }, 1.0 + curve::BINS as f64 / PEAK_SLICE as f64);
     }
 
     fn evaluate_peak(&mut self, bin: usize) {
         let curve = &self.curves[self.sense_index()];
         for bin in bin..bin + PEAK_SLICE {
-            if let Some((_, travel, torque)) = curve.point(bin) {
-                self.peak.add(travel, torque);
+            if let Some((n, travel, torque)) = curve.point(bin) {
+                self.peak.add(n, travel, torque);
             }
         }
         if bin + PEAK_SLICE >= curve.used() {
@@ -337,7 +380,7 @@ impl Backlash {
             Ok(fitted) => fitted,
             Err(fault) => return self.leave(fault),
         };
-        let steps = self.curves[index].used();
+        let steps = self.curves[index].used() as f64 * self.plan.bin / self.plan.step;
         self.senses[index].add(&fitted, &self.levels, self.peak.found(), steps);
         self.reversal += 1;
         let all = self.plan.senses * self.plan.repeats;
