@@ -6,8 +6,8 @@
 //! Dry friction without presliding is a hybrid automaton (Filippov; Karnopp 1985): each mass sticks or slides one way,
 //! the sliding legs are integrated by the classical Runge–Kutta method of fourth order, and a mass whose speed changes
 //! sign is caught at rest, from where it breaks away only when the rest of the forces exceeds the friction at rest.
-//! With presliding it is Dahl's law solved in closed form over the displacement of a step, f = s·F − (s·F − f₀)·e^(−|Δq|/d),
-//! with LuGre's bristle damping σ₁·ż. The current loop's first-order lag is exact.
+//! With presliding it is Dahl's law solved in closed form over the displacement of a step, f = s·F − (s·F − f₀)·e^(−σ|Δq|/F),
+//! σ = Tc/d, with LuGre's bristle damping σ₁·ż. The current loop's first-order lag is exact.
 
 use super::truth::{Coupling, Truth};
 
@@ -105,9 +105,14 @@ impl<'a> Machine<'a> {
         let way = q - start.q[i];
         let s = if way == 0.0 { w.signum() } else { way.signum() };
         let level = self.truth.dry(t, q, w, s);
-        let end = s * level;
-        let f = end - (end - start.bristle[i]) * (-way.abs() / self.truth.presliding).exp();
+        let f = self.stretched(start.bristle[i], way, s, level);
         f + self.bristle_damping * w * (1.0 - w.signum() * f / level)
+    }
+
+    /// Dahl's friction `f` after a further displacement `way` in direction `s`, sliding at `level`.
+    fn stretched(&self, f: f64, way: f64, s: f64, level: f64) -> f64 {
+        let end = s * level;
+        end - (end - f) * (-way.abs() / self.truth.presliding * self.truth.coulomb / level).exp()
     }
 
     fn level(&self, i: usize, t: f64, q: f64, w: f64, direction: f64) -> f64 {
@@ -189,8 +194,8 @@ impl<'a> Machine<'a> {
                 // The bristles alone: their damping is not stored.
                 let way = next.q[i] - q[i];
                 let s = way.signum();
-                let end = s * self.truth.dry(t, next.q[i], next.w[i], s);
-                next.bristle[i] = end - (end - m.bristle[i]) * (-way.abs() / self.truth.presliding).exp();
+                let level = self.truth.dry(t, next.q[i], next.w[i], s);
+                next.bristle[i] = self.stretched(m.bristle[i], way, s, level);
             }
         }
         *m = next;

@@ -273,4 +273,29 @@ mod tests {
         let share = (0..c.len() - 1).filter(|&i| forward(i)).count() as f64 / c.len() as f64;
         assert!(share > 0.998, "{share}");
     }
+
+    #[test]
+    fn at_constant_speed_the_axis_lags_as_the_loop_says() {
+        for seed in 0..8 {
+            let rig = rig(seed);
+            let speed = 0.1 * rig.reach.speed;
+            let there = [moves::Segment::Move { to: 4.0 * speed, speed, acceleration: rig.reach.acceleration }];
+            let command = moves::sample(0.0, &there, rig.servo.period, 3.5, 0.0);
+            let r = run(&rig, &Truth::of(&rig), &command, 1e-5, &mut Random::new(1, 1));
+            // Kp·lag + ff·ω − ω + I = T/Kv with T = Tv·ω + Tc + T0, all of it from I where there is one.
+            let s = &rig.servo;
+            let w = speed / rig.unit;
+            let torque = rig.viscous * w + rig.coulomb + rig.constant;
+            let asked = if s.integral_time.is_some() { 0.0 } else { torque / s.velocity_gain };
+            let expected = (asked + (1.0 - s.feedforward) * w) / s.position_gain * rig.unit;
+            let rows = (3.0 / s.period) as usize..(3.4 / s.period) as usize;
+            let mean = rows.clone().map(|i| command[i] - r.position[i]).sum::<f64>() / rows.len() as f64;
+            assert!(
+                (mean - expected).abs() < 0.01 * expected.abs() + 2.0 * rig.encoder_step,
+                "seed {seed}: {mean} for {expected}"
+            );
+            let held = rows.clone().map(|i| r.clean_torque[i]).sum::<f64>() / rows.len() as f64;
+            assert!((held / torque - 1.0).abs() < 0.01, "seed {seed}: {held} for {torque}");
+        }
+    }
 }
