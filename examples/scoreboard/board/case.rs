@@ -10,7 +10,7 @@ use super::moves;
 use super::outside::{self, Outside};
 use super::random::Random;
 use super::record::{self, Recording};
-use super::rig::Rig;
+use super::rig::{Rig, Scale};
 use super::truth::Truth;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -105,7 +105,7 @@ impl Bench {
                 return None;
             }
             if effects::on_table_only(cause) && rig.table.is_none() {
-                rig.table = Some((random.pick(&[1e-4, 5e-4, 1e-3]), random.log_uniform(5e-5, 5e-4)));
+                rig.table = Some(Scale::draw(random));
             }
         }
         let slow = random.uniform(0.1, 0.4);
@@ -131,7 +131,7 @@ impl Bench {
             apart(&r.clean_torque, &self.belief.clean_torque, 0.0) / self.rig.torque_floor().hypot(self.jitter.0);
         let grid = self.rig.encoder_step / 12f64.sqrt();
         let position = apart(&r.true_position, &self.belief.true_position, 0.0) / grid.hypot(self.jitter.1);
-        let table = if r.table.is_some() { record::rms(&r.table_error) / self.rig.table_floor() } else { 0.0 };
+        let table = if r.table.is_some() { record::spread(&r.table_error) / self.rig.table_floor() } else { 0.0 };
         torque.max(position).max(table)
     }
 
@@ -186,7 +186,7 @@ fn runs_well(rig: &Rig, r: &Recording) -> bool {
 
 fn size_of(rig: &Rig, r: &Recording, cause: &str) -> f64 {
     let torque = record::rms(&r.unexplained) / rig.torque_floor();
-    let table = if r.table.is_some() { record::rms(&r.table_error) / rig.table_floor() } else { 0.0 };
+    let table = if r.table.is_some() { record::spread(&r.table_error) / rig.table_floor() } else { 0.0 };
     if effects::on_table_only(cause) { table } else { torque.max(table) }
 }
 

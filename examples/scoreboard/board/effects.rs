@@ -283,13 +283,14 @@ impl Effect {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::board::rig::Scale;
     use crate::board::{moves, record};
 
     /// A rig of each drive, with a smooth servo and a scale, and a run of it.
     fn bench(drive: Drive) -> (Rig, Vec<f64>) {
         let fits = |r: &Rig| r.drive == drive && r.gearing != 36.0 && r.servo.period >= 1e-3;
         let mut rig = (0..999).map(|s| Rig::draw(&mut Random::new(11, s), 10.0)).find(fits).unwrap();
-        rig.table = Some((1e-6, 0.0));
+        rig.table = Some(Scale { step: 1e-6, noise: 0.0, zero: 0.0 });
         let (start, segments) = moves::draw(&mut Random::new(5, 5), &rig.reach, rig.duration, 0.3);
         let command = moves::sample(start, &segments, rig.servo.period, rig.duration, 0.02);
         (rig, command)
@@ -364,7 +365,7 @@ mod tests {
     #[test]
     fn a_clearance_is_lost_at_a_reversal_as_wide_as_it_says() {
         let (mut rig, _) = bench(Drive::BallScrew);
-        rig.table = Some((1e-6, 0.0));
+        rig.table = Some(Scale { step: 1e-6, noise: 0.0, zero: 0.0 });
         let effect = Effect { amount: 0.04, ..Effect::draw("backlash", &rig, 1.0, &mut Random::new(2, 2)) };
         let mut truth = Truth::of(&rig);
         effect.apply(&rig, &mut truth);

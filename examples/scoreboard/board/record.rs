@@ -65,7 +65,7 @@ impl Servo {
 }
 
 fn on_grid(x: f64, step: f64) -> f64 {
-    (x / step).round() * step
+    if step > 0.0 { (x / step).round() * step } else { x }
 }
 
 /// Runs the true machine under its servo along `command` (load units, one per cycle) with a plant step of at most `step` s.
@@ -108,8 +108,8 @@ pub fn run(rig: &Rig, truth: &Truth, command: &[f64], step: f64, noise: &mut Ran
         out.true_position.push(x);
         let table_at = truth.scale_reads(machine.table(&motion) * rig.unit);
         out.table_error.push(table_at - x);
-        if let (Some(column), Some((grid, deviation))) = (&mut out.table, rig.table) {
-            column.push(on_grid(table_at + deviation * noise.normal(), grid));
+        if let (Some(column), Some(scale)) = (&mut out.table, rig.table) {
+            column.push(on_grid(table_at + scale.zero + scale.noise * noise.normal(), scale.step));
         }
         let a = machine.motor_acceleration(&motion);
         let without_dry = rig.inertia * a + rig.viscous * motion.w[0] + rig.constant;
@@ -132,7 +132,7 @@ pub fn run(rig: &Rig, truth: &Truth, command: &[f64], step: f64, noise: &mut Ran
         // At rest friction takes any value up to its level: only what is beyond that is unexplained.
         let left = if sign == 0.0 { rest - rest.clamp(-rig.coulomb, rig.coulomb) } else { rest - sign * rig.coulomb };
         out.unexplained.push(left);
-        out.torque.push(caught[from] + rig.torque_noise * noise.normal());
+        out.torque.push(on_grid(caught[from] + rig.torque_noise * noise.normal(), rig.torque_step));
     }
     out
 }
@@ -141,21 +141,28 @@ impl Recording {
     /// Writes the recording in the exchange format.
     pub fn write(&self, rig: &Rig, path: &Path) -> std::io::Result<()> {
         let mut file = BufWriter::new(std::fs::File::create(path)?);
-        let unit = rig.position_unit();
+        let (unit, factor, decimals) = rig.column;
         write!(file, "time_s,x.position_command_{unit},x.position_{unit}")?;
         if self.table.is_some() {
             write!(file, ",x.table_position_{unit}")?;
         }
         writeln!(file, ",x.{}", if rig.linear() { "force_n" } else { "torque_nm" })?;
         for i in 0..self.command.len() {
-            write!(file, "{:.6},{:.7},{:.8}", i as f64 * self.period, self.command[i], self.position[i])?;
-            if let Some(table) = &self.table {
-                write!(file, ",{:.7}", table[i])?;
+            write!(file, "{:.6}", i as f64 * self.period)?;
+            let table = self.table.as_ref().map(|t| t[i]);
+            for x in [self.command[i], self.position[i]].into_iter().chain(table) {
+                write!(file, ",{:.decimals$}", x * factor)?;
             }
             writeln!(file, ",{:.6}", self.torque[i])?;
         }
         file.flush()
     }
+}
+
+/// Root mean square about the mean.
+pub fn spread(values: &[f64]) -> f64 {
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    rms(&values.iter().map(|v| v - mean).collect::<Vec<_>>())
 }
 
 pub fn rms(values: &[f64]) -> f64 {
@@ -220,7 +227,7 @@ mod tests {
 
     #[test]
     fn the_logged_noise_and_grid_are_those_of_the_rig() {
-        let rig = rig(5);
+        let rig = Rig { torque_step: 0.0, ..rig(5) };
         let r = run(&rig, &Truth::of(&rig), &command(&rig), 2e-5, &mut Random::new(1, 1));
         let noise: Vec<f64> = r.torque.iter().zip(&r.clean_torque).map(|(a, b)| a - b).collect();
         assert!((rms(&noise) / rig.torque_noise - 1.0).abs() < 0.03, "{}", rms(&noise) / rig.torque_noise);

@@ -32,6 +32,23 @@ pub struct ServoGains {
     pub two_sample_mean: bool,
 }
 
+/// The scale on the table, load units.
+#[derive(Clone, Copy, Debug)]
+pub struct Scale {
+    pub step: f64,
+    /// Standard deviation.
+    pub noise: f64,
+    /// Where it stands when the encoder says zero: the two are not homed to the last micrometre.
+    pub zero: f64,
+}
+
+impl Scale {
+    pub fn draw(random: &mut Random) -> Self {
+        let (step, noise) = (random.pick(&[1e-4, 5e-4, 1e-3]), random.log_uniform(5e-5, 5e-4));
+        Self { step, noise, zero: if random.chance(0.5) { 0.0 } else { random.uniform(-0.02, 0.02) } }
+    }
+}
+
 #[derive(Clone, Debug)]
 pub struct Rig {
     pub drive: Drive,
@@ -50,8 +67,11 @@ pub struct Rig {
     pub encoder_step: f64,
     /// Standard deviation of the logged torque's noise.
     pub torque_noise: f64,
-    /// Grid and noise (standard deviation) of the table's scale, load units; `None`: no scale.
-    pub table: Option<(f64, f64)>,
+    /// Grid of the logged torque; 0: none.
+    pub torque_step: f64,
+    pub table: Option<Scale>,
+    /// Unit of the position columns, how many of it are a load unit, and the decimals that are written.
+    pub column: (&'static str, f64, usize),
     pub reach: Reach,
     /// Moving average of the command, s.
     pub smoothing: f64,
@@ -121,7 +141,13 @@ impl Rig {
         let grids = [1e-7, 2e-7, 5e-7, 1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4];
         let fit: Vec<f64> = grids.iter().copied().filter(|g| *g <= loudest).collect();
         let encoder_step = if fit.is_empty() { grids[0] } else { random.pick(&fit[fit.len().saturating_sub(4)..]) };
-        let table = random.chance(0.4).then(|| (random.pick(&[1e-4, 5e-4, 1e-3]), random.log_uniform(5e-5, 5e-4)));
+        let torque_step = if random.chance(0.7) { 0.0 } else { torque_noise * random.uniform(0.2, 1.0) };
+        let table = random.chance(0.4).then(|| Scale::draw(random));
+        let column = if drive == Drive::Rotary {
+            random.pick(&[("deg", 1.0, 8), ("deg", 1.0, 8), ("rad", TAU / 360.0, 10)])
+        } else {
+            random.pick(&[("mm", 1.0, 8), ("mm", 1.0, 8), ("mm", 1.0, 8), ("um", 1e3, 5), ("m", 1e-3, 11)])
+        };
         let low = random.uniform(-0.5, 0.5) * stroke;
         Self {
             drive,
@@ -136,23 +162,26 @@ impl Rig {
             servo,
             encoder_step,
             torque_noise,
+            torque_step,
             table,
+            column,
             reach: Reach { low, high: low + stroke, speed, acceleration },
             smoothing: if random.chance(0.5) { 0.0 } else { random.uniform(0.005, 0.04) },
             duration: random.log_uniform(10.0, longest),
         }
     }
 
-    /// Torque noise and what the encoder's grid adds through the velocity loop: two grid errors, step/√12 each.
+    /// Torque noise, the grid it is logged on, and what the encoder's grid adds through the velocity loop: two grid errors, step/√12 each.
     pub fn torque_floor(&self) -> f64 {
         let quantum = self.encoder_step / 12f64.sqrt() * 2f64.sqrt() / self.servo.period / self.unit;
-        self.torque_noise.hypot(self.servo.velocity_gain * quantum / if self.servo.two_sample_mean { 2.0 } else { 1.0 })
+        let logged = self.torque_noise.hypot(self.torque_step / 12f64.sqrt());
+        logged.hypot(self.servo.velocity_gain * quantum / if self.servo.two_sample_mean { 2.0 } else { 1.0 })
     }
 
     /// Noise of table − encoder, load units: both grids and the scale's own noise.
     pub fn table_floor(&self) -> f64 {
-        let (step, noise) = self.table.unwrap_or((0.0, 0.0));
-        (noise * noise + (step * step + self.encoder_step * self.encoder_step) / 12.0).sqrt()
+        let scale = self.table.map_or(0.0, |s| s.noise * s.noise + s.step * s.step / 12.0);
+        (scale + self.encoder_step * self.encoder_step / 12.0).sqrt()
     }
 
     pub fn linear(&self) -> bool {
@@ -166,11 +195,6 @@ impl Rig {
             (true, _) => key.replace("_nm", "_n"),
             (false, _) => key.into(),
         }
-    }
-
-    /// Position unit of the recording's columns.
-    pub fn position_unit(&self) -> &'static str {
-        if self.drive == Drive::Rotary { "deg" } else { "mm" }
     }
 
     /// The machine file of the belief, extended by `effects` (empty: the base file).
