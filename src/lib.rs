@@ -11,6 +11,7 @@
 //! | [`machine`] | `machine.json`: belief and effects, the vocabulary of causes |
 //! | [`plant`] | one axis under its servo: simulation and prediction |
 //! | [`analysis`] | what can be read off a recording without a model: inspection, lost motion |
+//! | [`report`] | pictures |
 //! | [`abi`] | the C surface: guard, types, one file a family; nothing but translation |
 
 #![deny(unsafe_op_in_unsafe_fn)]
@@ -27,5 +28,6 @@ pub mod program;
 pub mod recording;
 
 pub mod analysis;
+pub mod report;
 
 pub mod abi;

@@ -81,6 +81,67 @@ pub fn hold_rows(values: &[f64], grid: f64) -> usize {
     median(&lengths).map_or(1, |rows| rows as usize)
 }
 
+/// A mean with what is needed to bound it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mean {
+    /// The mean.
+    pub value: f64,
+    /// Its standard error, with neighbours that move together counted once.
+    pub error: f64,
+    /// Degrees of freedom behind that error.
+    pub freedom: f64,
+}
+
+/// The fewest independent values a correlated stretch is taken to hold: a trend, however long, has hardly more to say.
+const FEWEST_INDEPENDENT: f64 = 3.0;
+
+/// The mean of values in order, with a standard error that respects their autocorrelation (initial positive sequence,
+/// Geyer 1992): n values with integrated autocorrelation time τ count as n/τ. `None` for fewer than two values.
+#[must_use]
+pub fn correlated_mean(values: &[f64]) -> Option<Mean> {
+    let n = values.len() as f64;
+    if values.len() < 2 {
+        return None;
+    }
+    let value = values.iter().sum::<f64>() / n;
+    let covariance = |lag: usize| {
+        values.iter().zip(values.iter().skip(lag)).map(|(a, b)| (a - value) * (b - value)).sum::<f64>() / n
+    };
+    let variance = covariance(0);
+    if variance <= 0.0 {
+        return Some(Mean { value, error: 0.0, freedom: n - 1.0 });
+    }
+    let mut time = 1.0;
+    for lag in (1..values.len() / 2).step_by(2) {
+        let pair = covariance(lag) + covariance(lag + 1);
+        if pair <= 0.0 {
+            break;
+        }
+        time += 2.0 * pair / variance;
+    }
+    let independent = (n / time).clamp(FEWEST_INDEPENDENT.min(n), n);
+    // The sample's own mean has taken one of the independent values.
+    let error = (variance / (independent - 1.0)).sqrt();
+    Some(Mean { value, error, freedom: independent - 1.0 })
+}
+
+/// Half-width of the central 95 % of Student's t distribution, in standard errors; `freedom` at least 1.
+/// (Exact up to 10 degrees of freedom, interpolated in 1/freedom between; Cornish and Fisher's expansion above.)
+#[must_use]
+pub fn student_95(freedom: f64) -> f64 {
+    const EXACT: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
+    let freedom = freedom.max(1.0);
+    let below = freedom.floor();
+    let at = |n: f64| EXACT.get(n as usize - 1).copied().unwrap_or_else(|| expansion(n));
+    let share = (1.0 / below - 1.0 / freedom) / (1.0 / below - 1.0 / (below + 1.0));
+    at(below) + share * (at(below + 1.0) - at(below))
+}
+
+fn expansion(freedom: f64) -> f64 {
+    const Z: f64 = 1.959_964;
+    Z + (Z.powi(3) + Z) / (4.0 * freedom) + (5.0 * Z.powi(5) + 16.0 * Z.powi(3) + 3.0 * Z) / (96.0 * freedom.powi(2))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -129,5 +190,35 @@ mod tests {
         assert_eq!(hold_rows(&ramp, 1e-4), 4);
         let slow: Vec<f64> = (0..1000).map(|i| (f64::from(i) * 0.2).floor() * 1e-4).collect();
         assert_eq!(hold_rows(&slow, 1e-4), 1);
+    }
+
+    #[test]
+    fn the_error_of_a_mean_respects_correlation() {
+        // First-order autoregression with coefficient 0.9: the mean of 400 scatters by 1/(1 − 0.9)/√400 = 0.5.
+        let mut normal = noise(11);
+        let (mut covered, mut errors) = (0, 0.0);
+        for _ in 0..400 {
+            let mut x = 0.0;
+            let values: Vec<f64> = (0..450)
+                .map(|_| {
+                    x = 0.9 * x + normal();
+                    x
+                })
+                .skip(50)
+                .collect();
+            let mean = correlated_mean(&values).unwrap();
+            errors += mean.error / 400.0;
+            covered += usize::from(mean.value.abs() < student_95(mean.freedom) * mean.error);
+        }
+        assert!((0.35..0.65).contains(&errors), "{errors}");
+        assert!((350..=396).contains(&covered), "{covered} of 400 within 95 %");
+    }
+
+    #[test]
+    fn student_agrees_with_the_tables() {
+        for (freedom, t) in [(1.0, 12.706), (4.0, 2.776), (12.0, 2.179), (30.0, 2.042), (1000.0, 1.962)] {
+            assert!((student_95(freedom) - t).abs() < 2e-3, "{freedom}");
+        }
+        assert!(student_95(2.5) < 4.303 && student_95(2.5) > 3.182);
     }
 }

@@ -4,6 +4,7 @@
 //! error as one sentence.
 
 mod inspect;
+mod lost_motion;
 mod program;
 mod table;
 
@@ -52,6 +53,7 @@ struct Cli {
 enum Command {
     Inspect(inspect::Inspect),
     Program(program::Program),
+    LostMotion(lost_motion::LostMotionCommand),
 }
 
 /// Runs the command that was asked for.
@@ -59,6 +61,7 @@ pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Inspect(command) => command.run(),
         Command::Program(command) => command.run(),
+        Command::LostMotion(command) => command.run(),
     };
     match result {
         Ok(answer) => {

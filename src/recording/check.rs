@@ -288,10 +288,8 @@ fn breaks(column: &mut Column) -> Vec<Issue> {
             "stands far off both neighbours; the row is left out".into(),
         ));
     }
-    // An outlier breaks twice: before it and after it.
-    column.breaks = jumps.iter().map(|jump| jump.0).chain(outliers.iter().flat_map(|row| [*row, row + 1])).collect();
-    column.breaks.sort_unstable();
-    column.breaks.dedup();
+    column.breaks = jumps.iter().map(|jump| jump.0).collect();
+    outliers.iter().for_each(|row| column.values[*row] = f64::NAN);
     issues
 }
 
@@ -407,7 +405,7 @@ mod tests {
         assert!(runs.iter().all(|run| !run.contains(&300) && !run.contains(&700)), "{runs:?}");
         assert_eq!(runs.iter().map(std::ops::Range::len).sum::<usize>(), 998);
         let refused = recording.need("x", crate::recording::Signal::Position, Unit::Mm).unwrap_err().to_string();
-        assert!(refused.contains("row 702") && refused.contains("x.position_mm"), "{refused}");
+        assert!(refused.contains("row 302") && refused.contains("x.position_mm"), "{refused}");
     }
 
     #[test]

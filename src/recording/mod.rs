@@ -30,9 +30,9 @@ pub struct Column {
     pub name: String,
     /// What the header says; `None` for a column outside the format, which is kept and ignored.
     pub label: Option<Label>,
-    /// One value a row. NaN where the cell was empty or not finite.
+    /// One value a row. NaN where the cell was empty, not finite or an outlier.
     pub values: Vec<f64>,
-    /// Rows before which the value jumps by an amount no motion explains, and rows that are single outliers.
+    /// Rows at which the value jumps by an amount that neither motion nor a counter wrap explains, ascending.
     pub(crate) breaks: Vec<usize>,
 }
 
@@ -174,11 +174,10 @@ impl Recording {
         }
     }
 
-    /// The stretches of rows in which every one of `columns` is finite and nothing breaks: no gap in time, no jump, no
-    /// outlier. In order, disjoint, each at least two rows.
+    /// The stretches of rows in which every one of `columns` is finite and nothing breaks: no gap in time, no jump. In order,
+    /// disjoint, each at least two rows.
     #[must_use]
     pub fn runs(&self, columns: &[&Column]) -> Vec<Range<usize>> {
-        let gap_s = self.sampling.gap_s;
         let mut runs = Vec::new();
         let mut start = 0;
         let mut close = |start: usize, end: usize| {
@@ -187,10 +186,8 @@ impl Recording {
             }
         };
         for row in 0..self.rows() {
-            let finite = columns.iter().all(|column| column.values.get(row).is_some_and(|value| value.is_finite()));
-            let broken = row > 0 && self.time_s[row] - self.time_s[row - 1] > gap_s
-                || columns.iter().any(|column| column.breaks.binary_search(&row).is_ok());
-            if broken || !finite {
+            let finite = finite(columns, row);
+            if !finite || self.breaks_at(columns, row, self.sampling.gap_s) {
                 close(start, row);
                 start = if finite { row } else { row + 1 };
             }
@@ -198,6 +195,37 @@ impl Recording {
         close(start, self.rows());
         runs
     }
+
+    /// The rows in which every one of `columns` is finite, split only at jumps and where more than `longest_s` is missing:
+    /// for analyses that bear uneven steps. Each piece has at least two rows.
+    #[must_use]
+    pub fn pieces(&self, columns: &[&Column], longest_s: f64) -> Vec<Vec<usize>> {
+        let mut pieces: Vec<Vec<usize>> = vec![Vec::new()];
+        let mut last_s = f64::NEG_INFINITY;
+        for row in 0..self.rows() {
+            let jumps = columns.iter().any(|column| column.breaks.binary_search(&row).is_ok());
+            if jumps || (finite(columns, row) && self.time_s[row] - last_s > longest_s) {
+                pieces.push(Vec::new());
+            }
+            if finite(columns, row) {
+                last_s = self.time_s[row];
+                if let Some(piece) = pieces.last_mut() {
+                    piece.push(row);
+                }
+            }
+        }
+        pieces.retain(|piece| piece.len() >= 2);
+        pieces
+    }
+
+    fn breaks_at(&self, columns: &[&Column], row: usize, longest_s: f64) -> bool {
+        row > 0 && self.time_s[row] - self.time_s[row - 1] > longest_s
+            || columns.iter().any(|column| column.breaks.binary_search(&row).is_ok())
+    }
+}
+
+fn finite(columns: &[&Column], row: usize) -> bool {
+    columns.iter().all(|column| column.values.get(row).is_some_and(|value| value.is_finite()))
 }
 
 /// The row of the file in which data row `index` (from 0) stands: the header is row 1.

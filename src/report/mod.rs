@@ -1,0 +1,4 @@
+//! Pictures for people: plots as SVG.
+
+pub mod lost_motion;
+pub mod plot;
