@@ -45,10 +45,14 @@ deps: ## install the Debian packages that the tests need
 	@tools/deps
 
 check-format:
-	$(CARGO) fmt --check
+	@if $(CARGO) fmt --version >/dev/null 2>&1; then $(CARGO) fmt --check; else echo "check-format: skipped, no rustfmt"; fi
 
+# A warning fails the test for the version that these sources are kept clean with; a newer one knows new lints, and a
+# stranger's test should not fail for them.
+CLIPPY := $(shell $(CARGO) clippy --version 2>/dev/null)
 check-lints:
-	$(CARGO) clippy -q --all-targets -- -D warnings
+	@if [ -n "$(CLIPPY)" ]; then $(CARGO) clippy -q --all-targets $(if $(findstring clippy 0.1.95,$(CLIPPY)),-- -D warnings); \
+	else echo "check-lints: skipped, no clippy"; fi
 
 test-rust:
 	GIB_RELEASE=$(RELEASE) $(CARGO) test

@@ -117,7 +117,6 @@ fn ragged(record: &::csv::ByteRecord, names: &[String], file: &str, row: usize) 
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::recording::Recording;
 
     fn error(text: &str) -> String {
