@@ -1,3 +1,14 @@
 //! Simulation: what an axis does, and what its motion says its motor must deliver.
 
+pub mod axis;
+pub mod closed_loop;
+mod coupling;
+pub mod friction;
 pub mod motion;
+pub mod moves;
+pub mod noise;
+pub mod observed;
+pub mod physics;
+pub mod predict;
+pub mod servo;
+pub mod simulate;

@@ -1,0 +1,114 @@
+//! The closed loop replayed: the recorded command through servo and model, at ideal sensors.
+//!
+//! Starts in the state that the recording shows in its first row; after that nothing measured enters.
+
+use super::motion::cubic_at;
+use super::noise::Noise;
+use super::observed::Observed;
+use super::predict::TorquePrediction;
+use super::simulate::{Setup, Start, simulate_physics};
+use crate::machine::Axis;
+
+/// A replayed recording, one value a row, load units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClosedLoop {
+    /// Motor encoder.
+    pub position: Vec<f64>,
+    /// Table, before any error of the screw whose phase is not known.
+    pub table_position: Vec<f64>,
+    /// Drive's own unit.
+    pub torque: Vec<f64>,
+}
+
+/// Simulates the recorded command under the axis's servo; `prediction` gives the numbers and the phases of its ripples.
+///
+/// `None` where the axis has no servo or the recording no command.
+///
+/// # Errors
+/// The simulation's, or a servo period that does not suit the recording.
+pub fn replay(axis: &Axis, observed: &Observed, prediction: &TorquePrediction) -> Result<Option<ClosedLoop>, String> {
+    let (Some(servo), Some(command)) = (&axis.servo, &observed.command) else { return Ok(None) };
+    let time = &observed.time_s;
+    let (Some(&begin), Some(&end)) = (time.first(), time.last()) else { return Ok(None) };
+    let cycles = ((end - begin) / servo.period_s).round() as usize + 1;
+    if cycles > 1000 * time.len() {
+        return Err(format!(
+            "servo.period_s {} is too short for a recording of {} rows over {} s",
+            servo.period_s,
+            time.len(),
+            end - begin
+        ));
+    }
+    let command = command_of_cycles(time, command, servo.period_s, cycles);
+    let at_start = |values: &[f64]| values.first().copied().filter(|value| value.is_finite());
+    let velocity = at_start(&observed.motion.velocity).unwrap_or(0.0);
+    let position = at_start(&observed.position).unwrap_or(command[0]);
+    let torque = at_start(&prediction.torque).unwrap_or(0.0);
+    let start = Start { position, velocity, torque };
+    let setup = Setup { start: Some(start), ..Setup::default() };
+    let trace = simulate_physics(axis, prediction.physics.clone(), &command, &setup, Noise::new(0))?;
+    // The rows of a recording made once a servo cycle are the cycles themselves.
+    let rows = |values: Vec<f64>| {
+        let place = |t: &f64| {
+            let exact = (t - begin) / servo.period_s;
+            if (exact - exact.round()).abs() < 0.02 { exact.round() } else { exact }
+        };
+        time.iter().map(|t| cubic_at(&values, place(t))).collect()
+    };
+    Ok(Some(ClosedLoop {
+        position: rows(trace.position),
+        table_position: rows(trace.table_position),
+        torque: rows(trace.torque),
+    }))
+}
+
+/// The command at the start of each servo cycle: interpolated between rows, held over rows without one.
+fn command_of_cycles(time_s: &[f64], command: &[f64], period: f64, cycles: usize) -> Vec<f64> {
+    let rows: Vec<(f64, f64)> =
+        time_s.iter().zip(command).filter(|(_, x)| x.is_finite()).map(|(t, x)| (t - time_s[0], *x)).collect();
+    let Some((&(_, first), &(_, last))) = rows.first().zip(rows.last()) else { return vec![0.0; cycles] };
+    let mut row = 0;
+    (0..cycles)
+        .map(|cycle| {
+            let t = cycle as f64 * period;
+            while row + 1 < rows.len() && rows[row + 1].0 <= t + 1e-3 * period {
+                row += 1;
+            }
+            let (t0, x0) = rows[row];
+            // Times are written rounded: a thousandth of a cycle is none.
+            if (t - t0).abs() <= 1e-3 * period {
+                return x0;
+            }
+            match rows.get(row + 1) {
+                Some(&(t1, x1)) if t >= t0 => x0 + (x1 - x0) * (t - t0) / (t1 - t0),
+                Some(_) => first,
+                None => last,
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_of_a_cycle_is_that_of_its_row() {
+        let time: Vec<f64> = (0..100).map(|i| f64::from(i) * 1e-3).collect();
+        let command: Vec<f64> = time.iter().map(|t| t * t).collect();
+        assert_eq!(command_of_cycles(&time, &command, 1e-3, 100), command);
+        // Four cycles a row: between the rows a straight line.
+        let fine = command_of_cycles(&time, &command, 0.25e-3, 397);
+        assert_eq!(fine.len(), 397);
+        for (cycle, x) in fine.iter().enumerate() {
+            let t = cycle as f64 * 0.25e-3;
+            assert!((x - t * t).abs() < 0.26e-6, "{cycle}");
+        }
+    }
+
+    #[test]
+    fn a_row_without_a_command_is_bridged() {
+        let time = [0.0, 1.0, 2.0, 3.0];
+        assert_eq!(command_of_cycles(&time, &[f64::NAN, 1.0, f64::NAN, 3.0], 1.0, 4), [1.0, 1.0, 2.0, 3.0]);
+    }
+}

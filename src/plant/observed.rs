@@ -1,0 +1,96 @@
+//! One axis of a recording in the units of the model, with its motion worked out once.
+
+use super::motion::{FEWEST_ROWS, Motion, noise_crossing_hz};
+use crate::machine::Axis;
+use crate::recording::{Recording, RecordingError, Signal, Unit};
+use std::ops::Range;
+
+/// What a recording shows of one axis. All columns have one value a row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Observed {
+    /// As recorded, s.
+    pub time_s: Vec<f64>,
+    /// Mean time between rows, s.
+    pub period_s: f64,
+    /// Load units (mm; degree for rotary).
+    pub position: Vec<f64>,
+    /// Drive's own unit (N·m or N); NaN where the recording has none.
+    pub torque: Vec<f64>,
+    /// Load units.
+    pub command: Option<Vec<f64>>,
+    /// Load units.
+    pub table_position: Option<Vec<f64>>,
+    /// Stretches of rows without gap or jump in the position, long enough for a motion.
+    pub runs: Vec<Range<usize>>,
+    /// Motion of those stretches; NaN in rows outside them.
+    pub motion: Motion,
+}
+
+impl Observed {
+    /// Takes the axis's columns from a recording.
+    ///
+    /// # Errors
+    /// Position or torque (force) is missing or in a unit of another quantity; no stretch of rows is whole.
+    pub fn of(recording: &Recording, axis: &Axis) -> Result<Observed, RecordingError> {
+        let load_unit = if axis.drive.is_rotary() { Unit::Deg } else { Unit::Mm };
+        let (signal, torque_unit) =
+            if axis.drive.is_linear() { (Signal::Force, Unit::N) } else { (Signal::Torque, Unit::Nm) };
+        let required = |signal: Signal, unit: Unit| {
+            let column = recording.column(&axis.name, signal)?;
+            match column.to(unit) {
+                Some(values) => Ok(values.into_owned()),
+                None => {
+                    let drive = axis.drive.name();
+                    let message = format!(
+                        "must be in {} or a unit that converts to it: the machine's drive is {drive}",
+                        unit.suffix()
+                    );
+                    Err(RecordingError::new(&recording.file, message).in_column(&column.name))
+                }
+            }
+        };
+        let optional = |signal| recording.get(&axis.name, signal).map(|_| required(signal, load_unit)).transpose();
+        let position = required(Signal::Position, load_unit)?;
+        let torque = required(signal, torque_unit)?;
+        let command = optional(Signal::PositionCommand)?;
+        let table_position = optional(Signal::TablePosition)?;
+        let runs = recording.runs(&[recording.column(&axis.name, Signal::Position)?]);
+        let observed = Self::from_columns(recording.time_s.clone(), position, torque, command, table_position, runs);
+        observed.ok_or_else(|| {
+            let message = format!(
+                "axis {} has no {FEWEST_ROWS} rows in a row without gap, jump or empty cell in its position",
+                axis.name
+            );
+            RecordingError::new(&recording.file, message)
+        })
+    }
+
+    /// The same from columns in the units of the model; `None` when no run is long enough.
+    #[must_use]
+    pub fn from_columns(
+        time_s: Vec<f64>,
+        position: Vec<f64>,
+        torque: Vec<f64>,
+        command: Option<Vec<f64>>,
+        table_position: Option<Vec<f64>>,
+        mut runs: Vec<Range<usize>>,
+    ) -> Option<Observed> {
+        runs.retain(|run| run.len() >= FEWEST_ROWS && run.end <= position.len());
+        let longest = runs.iter().max_by_key(|run| run.len())?.clone();
+        let period_s = (time_s[longest.end - 1] - time_s[longest.start]) / (longest.len() - 1) as f64;
+        let cutoff_hz = noise_crossing_hz(&position[longest], period_s);
+        let nothing = || vec![f64::NAN; position.len()];
+        let mut motion =
+            Motion { position: nothing(), velocity: nothing(), acceleration: nothing(), cutoff_hz, resolution: 0.0 };
+        let mut square = 0.0;
+        for run in &runs {
+            let part = Motion::with_cutoff(&time_s[run.clone()], &position[run.clone()], Some(cutoff_hz))?;
+            motion.position[run.clone()].copy_from_slice(&part.position);
+            motion.velocity[run.clone()].copy_from_slice(&part.velocity);
+            motion.acceleration[run.clone()].copy_from_slice(&part.acceleration);
+            square += part.resolution * part.resolution * run.len() as f64;
+        }
+        motion.resolution = (square / runs.iter().map(Range::len).sum::<usize>() as f64).sqrt();
+        Some(Observed { time_s, period_s, position, torque, command, table_position, runs, motion })
+    }
+}

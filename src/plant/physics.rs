@@ -1,0 +1,315 @@
+//! What an axis's belief and effects say in numbers: the torques the motor must deliver at a place, speed and time.
+//!
+//! T = J·α + Tv·ω + A·|ω| + F + T0 + slope·(x − x0) + C·v·|v| + Σ a·sin(2π·x/p + φ) + Σ a·sin(2π·f·t + φ)
+//!
+//! with the friction level |F| ≤ Tc + Ts·exp(−(v/vs)²) + Σ peak·exp(−((x − c)/w)²) + drop·exp(−t/τ). Motor quantities
+//! (J, ω, torques) are in the drive's own unit, x and v in load units (mm, mm/s; degrees on a rotary axis), t in s from
+//! the recording's first row.
+
+use crate::machine::{Axis, Effect, TwoMasses};
+use std::f64::consts::TAU;
+
+/// A sine in position or time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ripple {
+    /// Torque in the drive's own unit; µm for a position error.
+    pub amplitude: f64,
+    /// Radians per load unit or per second.
+    pub wave: f64,
+    /// Radians.
+    pub phase: f64,
+}
+
+impl Ripple {
+    /// The value at a position or time.
+    #[must_use]
+    pub fn at(&self, x: f64) -> f64 {
+        self.amplitude * (self.wave * x + self.phase).sin()
+    }
+}
+
+/// A place along the stroke where friction differs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Spot {
+    centre: f64,
+    peak: f64,
+    per_width: f64,
+}
+
+/// The numbers of an axis, ready for evaluation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Physics {
+    /// Motor coordinate per load unit.
+    pub motor_per_load: f64,
+    /// J of motor and table together.
+    pub inertia: f64,
+    /// Motor and table, where something is between them.
+    pub two_masses: Option<TwoMasses>,
+    /// Bristle displacement at full Coulomb friction in the motor's coordinate, where friction builds over a displacement.
+    pub presliding: Option<f64>,
+    /// How late the torque column is, s.
+    pub delay_s: f64,
+    /// Torque ripple over the motor's position, in the order of the effects.
+    pub cogging: Vec<Ripple>,
+    /// Disturbances over time, in the order of the effects.
+    pub vibration: Vec<Ripple>,
+    /// Table against encoder: amplitude in µm, in the order of the effects.
+    pub table_error: Vec<Ripple>,
+    /// Table against encoder: share of the travel.
+    pub table_scale: f64,
+    coulomb: f64,
+    viscous: f64,
+    asymmetry: f64,
+    constant: f64,
+    stribeck: Option<(f64, f64)>,
+    spots: Vec<Spot>,
+    drift: Option<(f64, f64)>,
+    cable: Option<(f64, f64)>,
+    drag: f64,
+    saturation: Option<(f64, f64)>,
+}
+
+impl Physics {
+    /// The numbers of an axis; every ripple has phase zero until one is set.
+    ///
+    /// # Errors
+    /// Effects that do not fit the inertia, as [`Axis::two_masses`].
+    pub fn of(axis: &Axis) -> Result<Physics, String> {
+        let belief = axis.belief();
+        let mut p = Physics {
+            motor_per_load: axis.drive.motor_per_load(),
+            inertia: belief.inertia,
+            two_masses: axis.two_masses()?,
+            presliding: None,
+            delay_s: 0.0,
+            cogging: Vec::new(),
+            vibration: Vec::new(),
+            table_error: Vec::new(),
+            table_scale: 0.0,
+            coulomb: belief.coulomb,
+            viscous: belief.viscous,
+            asymmetry: 0.0,
+            constant: belief.constant,
+            stribeck: None,
+            spots: Vec::new(),
+            drift: None,
+            cable: None,
+            drag: 0.0,
+            saturation: None,
+        };
+        let ripple = |amplitude, wave| Ripple { amplitude, wave, phase: 0.0 };
+        for effect in &axis.effects {
+            match *effect {
+                // Done in the belief or in the two masses.
+                Effect::InertiaMismatch { .. }
+                | Effect::CoulombFrictionMismatch { .. }
+                | Effect::ViscousFrictionMismatch { .. }
+                | Effect::ConstantTorque { .. }
+                | Effect::Backlash { .. }
+                | Effect::DriveCompliance { .. } => {}
+                Effect::DirectionDependentFriction { asymmetry } => p.asymmetry = asymmetry,
+                Effect::StribeckFriction { torque, velocity_mm_s } => p.stribeck = Some((torque, 1.0 / velocity_mm_s)),
+                Effect::PreslidingFriction { displacement_um } => {
+                    p.presliding = Some(displacement_um * axis.drive.motor_per_um());
+                }
+                Effect::Cogging { amplitude, period_mm } => p.cogging.push(ripple(amplitude, TAU / period_mm)),
+                Effect::PositionDependentFriction { centre_mm, peak, width_mm } => {
+                    p.spots.push(Spot { centre: centre_mm, peak, per_width: 1.0 / width_mm });
+                }
+                Effect::CableForce { slope, zero_mm } => p.cable = Some((slope, zero_mm)),
+                // v in m/s is 1e-3 of v in mm/s.
+                Effect::QuadraticDrag { drag } => p.drag = drag * 1e-6,
+                Effect::ThermalDrift { drop, time_constant_s } => p.drift = Some((drop, 1.0 / time_constant_s)),
+                Effect::DeadTime { delay_ms } => p.delay_s = delay_ms * 1e-3,
+                Effect::ExternalVibration { frequency_hz, amplitude } => {
+                    p.vibration.push(ripple(amplitude, TAU * frequency_hz));
+                }
+                Effect::TorqueSaturation { limit, slope_ratio } => p.saturation = Some((limit, slope_ratio)),
+                Effect::ScrewPitchError { scale_um_m } => p.table_scale = scale_um_m * 1e-6,
+                Effect::ScrewPeriodicError { amplitude_um, period_mm } => {
+                    p.table_error.push(ripple(amplitude_um, TAU / period_mm));
+                }
+            }
+        }
+        Ok(p)
+    }
+
+    /// Largest dry friction at a position, speed (load units) and time; never negative.
+    #[must_use]
+    #[inline]
+    pub fn friction_level(&self, x: f64, v: f64, t: f64) -> f64 {
+        let mut level = self.coulomb;
+        if let Some((torque, per_velocity)) = self.stribeck {
+            let ratio = v * per_velocity;
+            level += torque * (-ratio * ratio).exp();
+        }
+        for spot in &self.spots {
+            let distance = (x - spot.centre) * spot.per_width;
+            level += spot.peak * (-distance * distance).exp();
+        }
+        if let Some((drop, per_time)) = self.drift {
+            level += drop * (-t * per_time).exp();
+        }
+        level.max(0.0)
+    }
+
+    /// Dry friction per bristle displacement, where friction builds over one.
+    #[must_use]
+    pub fn bristle_stiffness(&self) -> Option<f64> {
+        // Without Coulomb friction the level at rest stands for it.
+        let level = if self.coulomb > 0.0 { self.coulomb } else { self.friction_level(0.0, 0.0, 0.0) };
+        self.presliding.map(|displacement| level / displacement)
+    }
+
+    /// Friction that grows with speed; `w` in the motor's coordinate.
+    #[must_use]
+    #[inline]
+    pub fn slope_friction(&self, w: f64) -> f64 {
+        self.slope_at(w) * w
+    }
+
+    /// Slope of that friction at a speed; `w` in the motor's coordinate.
+    #[must_use]
+    #[inline]
+    pub fn slope_at(&self, w: f64) -> f64 {
+        self.viscous + self.asymmetry * w.signum()
+    }
+
+    /// Tc alone.
+    #[must_use]
+    pub fn coulomb(&self) -> f64 {
+        self.coulomb
+    }
+
+    /// T0 alone.
+    #[must_use]
+    pub fn constant_torque(&self) -> f64 {
+        self.constant
+    }
+
+    /// Torque of the load that needs no motion of the axis's own: gravity, cable, drag, vibration.
+    #[must_use]
+    #[inline]
+    pub fn load(&self, x: f64, v: f64, t: f64) -> f64 {
+        let mut torque = self.constant + self.drag * v * v.abs();
+        if let Some((slope, zero)) = self.cable {
+            torque += slope * (x - zero);
+        }
+        for ripple in &self.vibration {
+            torque += ripple.at(t);
+        }
+        torque
+    }
+
+    /// Ripple of the motor at its position (load units).
+    #[must_use]
+    #[inline]
+    pub fn cogging_torque(&self, x: f64) -> f64 {
+        self.cogging.iter().map(|ripple| ripple.at(x)).sum()
+    }
+
+    /// Table position at an ideal one (load units): pitch and periodic error of the screw.
+    #[must_use]
+    pub fn table_of(&self, x: f64) -> f64 {
+        x * (1.0 + self.table_scale) + 1e-3 * self.table_error.iter().map(|ripple| ripple.at(x)).sum::<f64>()
+    }
+
+    /// What the motor delivers when its current says `torque`.
+    #[must_use]
+    #[inline]
+    pub fn delivered(&self, torque: f64) -> f64 {
+        match self.saturation {
+            Some((limit, slope)) if torque.abs() > limit => torque.signum() * (limit + slope * (torque.abs() - limit)),
+            _ => torque,
+        }
+    }
+
+    /// What the current says when the motor delivers `torque`; a motor that delivers nothing beyond its limit cannot say
+    /// how far beyond it was driven, and the limit stands.
+    #[must_use]
+    pub fn indicated(&self, torque: f64) -> f64 {
+        match self.saturation {
+            Some((limit, slope)) if torque.abs() > limit => {
+                let excess = if slope > 0.02 { (torque.abs() - limit) / slope } else { 0.0 };
+                torque.signum() * (limit + excess)
+            }
+            _ => torque,
+        }
+    }
+
+    /// Whether nothing but base values and the two masses act: no term that needs position or time.
+    #[must_use]
+    pub fn is_plain(&self) -> bool {
+        self.asymmetry == 0.0
+            && self.stribeck.is_none()
+            && self.spots.is_empty()
+            && self.drift.is_none()
+            && self.cable.is_none()
+            && self.drag == 0.0
+            && self.cogging.is_empty()
+            && self.vibration.is_empty()
+            && self.saturation.is_none()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::Machine;
+
+    fn physics(effects: &str) -> Physics {
+        let text = format!(
+            r#"{{"schema":"gib.machine/1","name":"t","axes":[{{"name":"x","drive":"ball_screw","lead_mm":10,"inertia_kg_m2":0.003,
+               "coulomb_friction_nm":0.5,"viscous_friction_nm_s":0.01,"constant_torque_nm":0.2,"effects":[{effects}]}}]}}"#
+        );
+        Physics::of(&Machine::parse(&text).unwrap().axes[0]).unwrap()
+    }
+
+    #[test]
+    fn every_term_is_what_the_format_says() {
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} is not {b}");
+        let e = (-1.0_f64).exp();
+        let p = physics(
+            r#"{"cause":"stribeck_friction","parameters":{"stribeck_torque_nm":0.3,"stribeck_velocity_mm_s":5}}"#,
+        );
+        near(p.friction_level(0.0, -5.0, 0.0), 0.5 + 0.3 * e);
+        let p = physics(
+            r#"{"cause":"position_dependent_friction","parameters":{"centre_mm":100,"peak_nm":0.3,"width_mm":7}}"#,
+        );
+        near(p.friction_level(93.0, 1.0, 0.0), 0.5 + 0.3 * e);
+        let p = physics(r#"{"cause":"thermal_drift","parameters":{"drop_nm":0.3,"time_constant_s":20}}"#);
+        near(p.friction_level(0.0, 1.0, 20.0), 0.5 + 0.3 * e);
+        let p = physics(r#"{"cause":"direction_dependent_friction","parameters":{"asymmetry_nm_s":0.004}}"#);
+        near(p.slope_friction(10.0), 0.14);
+        near(p.slope_friction(-10.0), -0.06);
+        let p = physics(r#"{"cause":"cable_force","parameters":{"slope_nm_mm":0.001}}"#);
+        near(p.load(50.0, 0.0, 0.0), 0.25);
+        let p = physics(r#"{"cause":"quadratic_drag","parameters":{"drag_nm_s2_m2":2}}"#);
+        near(p.load(0.0, -500.0, 0.0), 0.2 - 0.5);
+        let p = physics(r#"{"cause":"cogging","parameters":{"amplitude_nm":0.1,"period_mm":2.5}}"#);
+        near(p.cogging_torque(0.625), 0.1);
+        let p = physics(r#"{"cause":"external_vibration","parameters":{"amplitude_nm":0.1,"frequency_hz":25}}"#);
+        near(p.load(0.0, 0.0, 0.01), 0.3);
+        let p = physics(r#"{"cause":"screw_pitch_error","parameters":{"scale_um_m":50}}"#);
+        near(p.table_of(200.0), 200.01);
+        let p = physics(r#"{"cause":"screw_periodic_error","parameters":{"amplitude_um":4,"period_mm":10}}"#);
+        near(p.table_of(2.5), 2.504);
+    }
+
+    #[test]
+    fn a_dip_never_turns_friction_into_a_drive() {
+        let p = physics(
+            r#"{"cause":"stribeck_friction","parameters":{"stribeck_torque_nm":-0.9,"stribeck_velocity_mm_s":5}}"#,
+        );
+        assert_eq!(p.friction_level(0.0, 0.0, 0.0), 0.0);
+    }
+
+    #[test]
+    fn saturation_and_its_inverse_agree() {
+        let p = physics(r#"{"cause":"torque_saturation","parameters":{"limit_nm":4,"slope_ratio":0.25}}"#);
+        assert_eq!((p.delivered(3.0), p.delivered(-8.0)), (3.0, -5.0));
+        for torque in [-9.0, -4.0, 0.0, 2.0, 6.5] {
+            assert!((p.indicated(p.delivered(torque)) - torque).abs() < 1e-12);
+        }
+    }
+}

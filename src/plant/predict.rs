@@ -1,0 +1,212 @@
+//! The torque that a machine file says a measured motion needs.
+//!
+//! Uses the motion of the whole recording (zero-phase) and never its torque, except for the phase of periodic terms,
+//! which is estimated from the first quarter of the rows. Dry friction at rest is not a function of the motion: it is
+//! carried over a standstill and turned round over a small travel, the one the machine says (pre-sliding) or the smallest
+//! that the position can tell.
+//!
+//! Sampling: a servo that holds its command for a cycle and a motor that follows with time constant τ log, at the end of
+//! each cycle, a torque that is later than the smooth torque of the motion by Ts/(1 − e^(−Ts/τ)) − Ts/2 − τ. Without a
+//! lag the torque jumps at that very instant and the middle of the jump is what the motion shows: no shift.
+
+use super::coupling::{longest_step_s, transmitted};
+use super::friction::Friction;
+use super::motion::cubic_at;
+use super::observed::Observed;
+use super::physics::{Physics, Ripple};
+use crate::machine::{Axis, Servo, TwoMasses};
+use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+
+/// A predicted torque and what it took to predict it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TorquePrediction {
+    /// Drive's own unit, one value a row; NaN where the motion is not known.
+    pub torque: Vec<f64>,
+    /// The axis's numbers, with the phases that were estimated.
+    pub physics: Physics,
+    /// Ripples whose phase could not be had from the first quarter: they are left out of the prediction.
+    pub phases_unknown: usize,
+}
+
+/// Predicts the torque column of a recording.
+///
+/// # Errors
+/// The effects contradict the inertia, as [`Axis::two_masses`].
+pub fn predict_torque(axis: &Axis, observed: &Observed) -> Result<TorquePrediction, String> {
+    let mut physics = Physics::of(axis)?;
+    let ripples = (std::mem::take(&mut physics.cogging), std::mem::take(&mut physics.vibration));
+    let delay_s = physics.delay_s + axis.servo.as_ref().map_or(0.0, sampling_shift_s);
+    let shift = delay_s / observed.period_s;
+
+    let mut delivered = vec![f64::NAN; observed.time_s.len()];
+    for run in &observed.runs {
+        needed_torque(&physics, observed, run.clone(), &mut delivered);
+    }
+    (physics.cogging, physics.vibration) = ripples;
+    let phases_unknown = set_phases(&mut physics, observed, &delivered, shift);
+
+    let mut torque = vec![f64::NAN; delivered.len()];
+    for run in &observed.runs {
+        for i in run.clone() {
+            let (x, t) = (observed.motion.position[i], observed.time_s[i] - observed.time_s[0]);
+            let vibration: f64 = physics.vibration.iter().map(|ripple| ripple.at(t)).sum();
+            delivered[i] += physics.cogging_torque(x) + vibration;
+            delivered[i] = physics.indicated(delivered[i]).clamp(-axis.base.torque_limit, axis.base.torque_limit);
+        }
+        let part = &delivered[run.clone()];
+        for i in 0..part.len() {
+            torque[run.start + i] = if shift == 0.0 { part[i] } else { cubic_at(part, i as f64 - shift) };
+        }
+    }
+    Ok(TorquePrediction { torque, physics, phases_unknown })
+}
+
+/// How much later than the motion's torque the logged one is, by sampling alone.
+#[must_use]
+pub fn sampling_shift_s(servo: &Servo) -> f64 {
+    let (period, lag) = (servo.period_s, servo.torque_time_constant_s);
+    if lag == 0.0 { 0.0 } else { period / (1.0 - (-period / lag).exp()) - 0.5 * period - lag }
+}
+
+/// Torque that the motor must deliver, without ripples, for one run of rows.
+fn needed_torque(physics: &Physics, observed: &Observed, run: Range<usize>, torque: &mut [f64]) {
+    let scale = physics.motor_per_load;
+    let (motion, time) = (&observed.motion, &observed.time_s);
+    // Ten times what the position leaves open on the average: it leaves more open at a reversal. Never nothing.
+    let smallest = (10.0 * motion.resolution * scale).max(1e-9 * scale);
+    let travel = physics.presliding.unwrap_or(0.0).max(smallest);
+    let transmitted = physics.two_masses.map(|masses| table_torque(physics, &masses, observed, run.clone()));
+    let (inertia, share) = match &physics.two_masses {
+        Some(masses) => (masses.motor_inertia, 1.0 - masses.table_friction_share),
+        None => (physics.inertia, 1.0),
+    };
+    let level_at_rest = physics.friction_level(motion.position[run.start], 0.0, 0.0);
+    let stiffness = physics.bristle_stiffness().filter(|_| travel > smallest).unwrap_or(level_at_rest / travel);
+    let mut friction = Friction { stiffness: share * stiffness, force: 0.0 };
+    let mut before = motion.position[run.start];
+    for i in run.clone() {
+        let (x, v, t) = (motion.position[i], motion.velocity[i], time[i] - time[0]);
+        let dry = friction.moved((x - before) * scale, share * physics.friction_level(x, v, t));
+        before = x;
+        let own = inertia * motion.acceleration[i] * scale + share * physics.slope_friction(v * scale) + dry;
+        torque[i] = own
+            + match &transmitted {
+                Some(table) => table[i - run.start],
+                None => physics.load(x, v, t),
+            };
+    }
+}
+
+/// Torque that the table takes from a motor that moves as measured: the table is simulated behind its spring or clearance.
+fn table_torque(physics: &Physics, masses: &TwoMasses, observed: &Observed, run: Range<usize>) -> Vec<f64> {
+    let scale = physics.motor_per_load;
+    let motion = &observed.motion;
+    let share = masses.table_friction_share;
+    let mut friction = Friction { stiffness: share * physics.bristle_stiffness().unwrap_or(0.0), force: 0.0 };
+    let at = |i: usize| (motion.position[i] * scale, motion.velocity[i] * scale);
+    let (mut q, mut w) = at(run.start);
+    // A table in motion is already pushed by its motor.
+    q -= if w == 0.0 { 0.0 } else { (0.5 * masses.clearance).copysign(w) };
+    let mut out = Vec::with_capacity(run.len());
+    let wind_up = |i: usize, q: f64, w: f64| {
+        let (motor, speed) = at(i);
+        transmitted(masses, motor - q, speed - w)
+    };
+    out.push(wind_up(run.start, q, w));
+    for i in run.start..run.end - 1 {
+        let span = observed.time_s[i + 1] - observed.time_s[i];
+        let steps = (span / longest_step_s(masses, masses.table_inertia)).ceil().clamp(1.0, 1000.0);
+        let h = span / steps;
+        let ((q0, w0), (q1, w1)) = (at(i), at(i + 1));
+        for step in 0..steps as usize {
+            let s = (step as f64 + 0.5) / steps;
+            let (motor, speed) = hermite(q0, w0 * span, q1, w1 * span, s);
+            let t = observed.time_s[i] - observed.time_s[0] + s * span;
+            let middle = q + 0.5 * h * w;
+            let (x, v) = (middle / scale, w / scale);
+            let push = transmitted(masses, motor - middle, speed / span - w)
+                - physics.load(x, v, t)
+                - share * physics.slope_friction(w);
+            let next = friction.step(
+                masses.table_inertia,
+                masses.table_inertia * w + h * push,
+                h,
+                w,
+                share * physics.friction_level(x, v, t),
+            );
+            q = middle + 0.5 * h * next;
+            w = next;
+        }
+        out.push(wind_up(i + 1, q, w));
+    }
+    out
+}
+
+/// Value and slope (per unit of `s`) of the cubic through two points with two slopes.
+fn hermite(a: f64, da: f64, b: f64, db: f64, s: f64) -> (f64, f64) {
+    let (c2, c3) = (3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db);
+    (a + s * (da + s * (c2 + s * c3)), da + s * (2.0 * c2 + s * 3.0 * c3))
+}
+
+/// Estimates the phases of cogging and vibration from the first quarter of the rows, where the axis moves; a ripple of
+/// which that quarter shows less than half a period is silenced. Returns how many.
+fn set_phases(physics: &mut Physics, observed: &Observed, delivered: &[f64], shift: f64) -> usize {
+    let (motion, time) = (&observed.motion, &observed.time_s);
+    let quarter = time.len() / 4;
+    let place = |i: usize| (motion.position[i], time[i] - time[0]);
+    let standing = 0.01 * rms(motion.velocity.iter().copied().filter(|v| v.is_finite()));
+    let rows: Vec<usize> = (0..quarter)
+        .filter(|&i| delivered[i].is_finite() && observed.torque[i].is_finite() && motion.velocity[i].abs() > standing)
+        .collect();
+    let residual: Vec<f64> =
+        rows.iter().map(|&i| physics.delivered(cubic_at(&observed.torque, i as f64 + shift)) - delivered[i]).collect();
+    let cogging = physics.cogging.len();
+    let mut ripples: Vec<&mut Ripple> = physics.cogging.iter_mut().chain(&mut physics.vibration).collect();
+    if ripples.is_empty() {
+        return 0;
+    }
+    let along = |k: usize, i: usize| if k < cogging { place(i).0 } else { place(i).1 };
+    // A wrong base value must not turn the phase: it is let free beside the ripples.
+    let nuisance = |i: usize| [1.0, motion.velocity[i], motion.velocity[i].signum(), motion.acceleration[i]];
+    let mut basis: Vec<Vec<f64>> = (0..4).map(|c| rows.iter().map(|&i| nuisance(i)[c]).collect()).collect();
+    let mut silenced = 0;
+    let mut column = Vec::with_capacity(ripples.len());
+    for (k, ripple) in ripples.iter_mut().enumerate() {
+        let (low, high) = rows
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &i| (low.min(along(k, i)), high.max(along(k, i))));
+        if !((high - low) * ripple.wave >= std::f64::consts::PI) {
+            ripple.amplitude = 0.0;
+            silenced += 1;
+            column.push(None);
+            continue;
+        }
+        column.push(Some(basis.len()));
+        basis.push(rows.iter().map(|&i| (ripple.wave * along(k, i)).sin()).collect());
+        basis.push(rows.iter().map(|&i| (ripple.wave * along(k, i)).cos()).collect());
+    }
+    let weights = least_squares(&basis, &residual);
+    for (ripple, column) in ripples.into_iter().zip(column) {
+        if let (Some(column), Some(weights)) = (column, &weights) {
+            ripple.phase = weights[column + 1].atan2(weights[column]);
+        }
+    }
+    silenced
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = values.fold((0.0, 0_u64), |(sum, n), v| (sum + v * v, n + 1));
+    (sum / n.max(1) as f64).sqrt()
+}
+
+/// Weights of the columns that come closest to the target; columns are scaled first, and useless ones get nothing.
+fn least_squares(columns: &[Vec<f64>], target: &[f64]) -> Option<Vec<f64>> {
+    let scales: Vec<f64> = columns.iter().map(|c| rms(c.iter().copied()).max(f64::MIN_POSITIVE)).collect();
+    let n = columns.len();
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let normal = DMatrix::from_fn(n, n, |i, j| dot(&columns[i], &columns[j]) / (scales[i] * scales[j]));
+    let right = DVector::from_fn(n, |i, _| dot(&columns[i], target) / scales[i]);
+    let solved = normal.svd(true, true).solve(&right, 1e-9 * target.len() as f64).ok()?;
+    Some(solved.iter().zip(scales).map(|(w, s)| w / s).collect())
+}

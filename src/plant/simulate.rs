@@ -1,0 +1,230 @@
+//! One axis under its servo, through its sensors: a commanded motion in, a recording out.
+//!
+//! Each servo cycle: encoder and scale are read and the row is logged with the motor's torque of that instant, the servo
+//! computes its torque, and the body runs on under it to the next cycle. Where the motor has no lag its torque jumps at
+//! that instant, and the row holds the middle of the jump.
+
+use super::axis::Body;
+use super::coupling::longest_step_s;
+use super::noise::Noise;
+use super::physics::{Physics, Ripple};
+use super::servo::ServoLoop;
+use crate::machine::{Axis, Drive, Servo};
+use std::f64::consts::TAU;
+
+/// Sensors of the recording. All zero: ideal ones. The servo reads the same encoder as the row.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Sensors {
+    /// Step of encoder and scale, µm (0.001 degree).
+    pub grid_um: f64,
+    /// Normal noise of encoder and scale before the grid, µm.
+    pub noise_um: f64,
+    /// How old the encoder's and the scale's value is when it is read, s.
+    pub delay_s: f64,
+    /// The encoder's scale error, µm per m.
+    pub scale_um_m: f64,
+    /// Amplitude of the encoder's once-per-motor-revolution error, µm.
+    pub eccentricity_um: f64,
+    /// Normal noise of the logged torque, drive's own unit.
+    pub torque_noise: f64,
+    /// Step of the logged torque.
+    pub torque_grid: f64,
+}
+
+/// State in which the simulation begins, load units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    /// Position of the motor.
+    pub position: f64,
+    /// Speed of motor and table.
+    pub velocity: f64,
+    /// Torque that the servo holds.
+    pub torque: f64,
+}
+
+/// What a simulation does besides the machine file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setup {
+    /// Longest plant step, s; a servo cycle is divided into whole steps, and a stiff drive makes them finer.
+    pub step_s: f64,
+    /// Sensors.
+    pub sensors: Sensors,
+    /// Of the noise and of the phases of periodic effects.
+    pub seed: u64,
+    /// Start; `None` begins at rest at the first command.
+    pub start: Option<Start>,
+}
+
+impl Default for Setup {
+    fn default() -> Setup {
+        Setup { step_s: 25e-6, sensors: Sensors::default(), seed: 0, start: None }
+    }
+}
+
+/// A simulated recording: one value a servo cycle, load units and the drive's own unit.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Trace {
+    /// From zero.
+    pub time_s: Vec<f64>,
+    /// As given.
+    pub command: Vec<f64>,
+    /// Motor encoder.
+    pub position: Vec<f64>,
+    /// Scale at the table.
+    pub table_position: Vec<f64>,
+    /// What the drive says the motor delivers.
+    pub torque: Vec<f64>,
+}
+
+/// Simulates an axis along a command (load units, one value a servo cycle); phases of periodic effects come from the seed.
+///
+/// # Errors
+/// The axis has no servo, a setting is out of range, or the effects contradict the inertia; the sentence says which.
+pub fn simulate(axis: &Axis, command: &[f64], setup: &Setup) -> Result<Trace, String> {
+    let mut physics = Physics::of(axis)?;
+    let mut noise = Noise::new(setup.seed);
+    let ripples = physics.cogging.iter_mut().chain(&mut physics.vibration).chain(&mut physics.table_error);
+    ripples.for_each(|ripple| ripple.phase = TAU * noise.uniform());
+    simulate_physics(axis, physics, command, setup, noise)
+}
+
+/// The same with phases given.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_physics(
+    axis: &Axis,
+    physics: Physics,
+    command: &[f64],
+    setup: &Setup,
+    mut noise: Noise,
+) -> Result<Trace, String> {
+    let servo =
+        axis.servo.ok_or("the machine file gives this axis no servo, so that no closed loop can be simulated")?;
+    let Some(&first) = command.first() else { return Ok(Trace::default()) };
+    if let Some(row) = command.iter().position(|x| !x.is_finite()) {
+        return Err(format!("the command of cycle {row} is not a finite number"));
+    }
+    let steps = steps_per_cycle(&physics, &servo, setup.step_s)?;
+    let step_s = servo.period_s / steps as f64;
+    let start = setup.start.unwrap_or(Start { position: first, velocity: 0.0, torque: physics.load(first, 0.0, 0.0) });
+    let scale = physics.motor_per_load;
+    let encoder = Encoder::new(axis.drive, &setup.sensors)?;
+    let log = TorqueLog { servo, delay_s: physics.delay_s, start: start.torque };
+    let table = physics.clone();
+    let (position, velocity) = (start.position * scale, start.velocity * scale);
+    let mut body = Body::new(physics, step_s, servo.torque_time_constant_s, position, velocity, start.torque);
+    let mut control = ServoLoop::new(servo, axis.base.torque_limit, position, first * scale, velocity, start.torque);
+
+    // The value read is that of `late` cycles and `fine` steps ago.
+    let age = (setup.sensors.delay_s / step_s).round() as usize;
+    let (late, fine) = (age.div_ceil(steps), (steps - age % steps) % steps);
+    let mut seen = vec![(body.motor_position(), body.table_position()); late];
+    let mut trace = Trace::default();
+    let mut torques = Vec::with_capacity(command.len());
+    for (cycle, &target) in command.iter().enumerate() {
+        let now = (body.motor_position(), body.table_position());
+        let (motor, table_motor) = if late == 0 { now } else { seen[cycle % late] };
+        let read = encoder.read(motor / scale, &mut noise);
+        trace.time_s.push(cycle as f64 * servo.period_s);
+        trace.position.push(read);
+        trace.table_position.push(encoder.digitise(table.table_of(table_motor / scale), &mut noise));
+        let asked = control.cycle(target * scale, read * scale);
+        torques.push((asked, body.torque()));
+        body.advance(asked, fine);
+        if late > 0 {
+            seen[cycle % late] = (body.motor_position(), body.table_position());
+        }
+        body.advance(asked, steps - fine);
+    }
+    trace.command = command.to_vec();
+    let grid = setup.sensors.torque_grid;
+    trace.torque = (0..command.len())
+        .map(|cycle| on_grid(log.at(&torques, cycle) + noise.normal(setup.sensors.torque_noise), grid))
+        .collect();
+    Ok(trace)
+}
+
+/// Whole plant steps in a servo cycle.
+fn steps_per_cycle(physics: &Physics, servo: &Servo, step_s: f64) -> Result<usize, String> {
+    if !(step_s >= 1e-8 && step_s <= 1.0) {
+        return Err(format!("the plant step of {step_s} s is out of range; give one from 1e-8 s to 1 s"));
+    }
+    let spring = physics
+        .two_masses
+        .map_or(f64::INFINITY, |masses| longest_step_s(&masses, masses.motor_inertia.min(masses.table_inertia)));
+    let steps = (servo.period_s / step_s.min(spring) - 1e-9).ceil().max(1.0);
+    if steps > 1e6 {
+        return Err("the drive is so stiff against its inertia that a cycle would take over a million steps".into());
+    }
+    Ok(steps as usize)
+}
+
+/// Encoder on the motor, with its errors; also the grid and noise of the scale.
+struct Encoder {
+    scale: f64,
+    eccentricity: Ripple,
+    grid: f64,
+    noise: f64,
+}
+
+impl Encoder {
+    fn new(drive: Drive, sensors: &Sensors) -> Result<Encoder, String> {
+        let revolution = match drive {
+            Drive::BallScrew { lead_mm } => lead_mm,
+            Drive::Rotary { ratio } => 360.0 / ratio,
+            Drive::Linear if sensors.eccentricity_um != 0.0 => {
+                return Err("a linear drive's encoder does not turn and has no eccentricity; leave it out".into());
+            }
+            Drive::Linear => f64::INFINITY,
+        };
+        let eccentricity = Ripple { amplitude: 1e-3 * sensors.eccentricity_um, wave: TAU / revolution, phase: 0.0 };
+        let values = [sensors.grid_um, sensors.noise_um, sensors.delay_s, sensors.torque_noise, sensors.torque_grid];
+        if values.iter().any(|value| !(*value >= 0.0 && value.is_finite())) || sensors.delay_s > 1.0 {
+            return Err("grid, noise and delay of the sensors must be 0 or more, the delay at most 1 s".into());
+        }
+        let scale = 1.0 + 1e-6 * sensors.scale_um_m;
+        Ok(Encoder { scale, eccentricity, grid: 1e-3 * sensors.grid_um, noise: 1e-3 * sensors.noise_um })
+    }
+
+    fn read(&self, x: f64, noise: &mut Noise) -> f64 {
+        self.digitise(x * self.scale + self.eccentricity.at(x), noise)
+    }
+
+    fn digitise(&self, x: f64, noise: &mut Noise) -> f64 {
+        on_grid(x + noise.normal(self.noise), self.grid)
+    }
+}
+
+fn on_grid(x: f64, grid: f64) -> f64 {
+    if grid > 0.0 { (x / grid).round() * grid } else { x }
+}
+
+/// The torque column: what the current said `delay_s` before the row (after it where negative).
+struct TorqueLog {
+    servo: Servo,
+    delay_s: f64,
+    start: f64,
+}
+
+impl TorqueLog {
+    /// `torques` holds of each cycle what was asked for and the motor's torque at its start.
+    fn at(&self, torques: &[(f64, f64)], cycle: usize) -> f64 {
+        let period = self.servo.period_s;
+        // Rounded to a millionth of a cycle, so that a delay of whole cycles meets their starts.
+        let place = ((cycle as f64 - self.delay_s / period) * 1e6).round() / 1e6;
+        if place < 0.0 {
+            return self.start;
+        }
+        let Some(&(asked, begin)) = torques.get(place as usize) else {
+            return torques.last().map_or(self.start, |(asked, _)| *asked);
+        };
+        let since = place.fract() * period;
+        let lag = self.servo.torque_time_constant_s;
+        match (lag > 0.0, since > 0.0) {
+            (true, _) => asked + (begin - asked) * (-since / lag).exp(),
+            (false, true) => asked,
+            (false, false) => 0.5 * (begin + asked),
+        }
+    }
+}
