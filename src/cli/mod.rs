@@ -5,7 +5,10 @@
 
 mod inspect;
 mod lost_motion;
+mod machine_file;
+mod predict;
 mod program;
+mod simulate;
 mod table;
 
 use std::error::Error;
@@ -52,16 +55,20 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Inspect(inspect::Inspect),
+    Predict(predict::Predict),
     Program(program::Program),
     LostMotion(lost_motion::LostMotionCommand),
+    Simulate(simulate::Simulate),
 }
 
 /// Runs the command that was asked for.
 pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Inspect(command) => command.run(),
+        Command::Predict(command) => command.run(),
         Command::Program(command) => command.run(),
         Command::LostMotion(command) => command.run(),
+        Command::Simulate(command) => command.run(),
     };
     match result {
         Ok(answer) => {

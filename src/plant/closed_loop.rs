@@ -63,7 +63,8 @@ pub fn replay(axis: &Axis, observed: &Observed, prediction: &TorquePrediction) -
 }
 
 /// The command at the start of each servo cycle: interpolated between rows, held over rows without one.
-fn command_of_cycles(time_s: &[f64], command: &[f64], period: f64, cycles: usize) -> Vec<f64> {
+#[must_use]
+pub fn command_of_cycles(time_s: &[f64], command: &[f64], period: f64, cycles: usize) -> Vec<f64> {
     let rows: Vec<(f64, f64)> =
         time_s.iter().zip(command).filter(|(_, x)| x.is_finite()).map(|(t, x)| (t - time_s[0], *x)).collect();
     let Some((&(_, first), &(_, last))) = rows.first().zip(rows.last()) else { return vec![0.0; cycles] };
