@@ -90,9 +90,15 @@ fn differentiate(values: &[f64], period: f64, cutoff_hz: f64) -> [Vec<f64>; 3] {
     let n = values.len();
     // Six periods of the cut-off: the filter has forgotten its start by then.
     let pad = ((6.0 / (cutoff_hz * period)) as usize).clamp(4, n - 1);
-    let (first, last) = (values[0], values[n - 1]);
-    let before = (1..=pad).rev().map(|k| 2.0 * first - values[k]);
-    let after = (1..=pad).map(|k| 2.0 * last - values[n - 1 - k]);
+    // Beyond its ends the series goes on by point reflection, which keeps the speed but would turn the acceleration over:
+    // twice the bend there is put on top. Value and bend come from a parabola through two periods of the cut-off.
+    let window = ((2.0 / (cutoff_hz * period)) as usize).clamp(8, n);
+    let head = parabola(&values[..window]);
+    let turned: Vec<f64> = values[n - window..].iter().rev().copied().collect();
+    let tail = parabola(&turned);
+    let beyond = |(value, bend): (f64, f64), k: usize, mirror: f64| 2.0 * value - mirror + bend * (k * k) as f64;
+    let before = (1..=pad).rev().map(|k| beyond(head, k, values[k]));
+    let after = (1..=pad).map(|k| beyond(tail, k, values[n - 1 - k]));
     let mut x: Vec<f64> = before.chain(values.iter().copied()).chain(after).collect();
     for section in Section::butterworth4(cutoff_hz * period) {
         section.run(&mut x);
@@ -106,6 +112,24 @@ fn differentiate(values: &[f64], period: f64, cutoff_hz: f64) -> [Vec<f64>; 3] {
     let second =
         |i| (16.0 * (at(i, 1) + at(i, -1)) - (at(i, 2) + at(i, -2)) - 30.0 * at(i, 0)) / (12.0 * period * period);
     [(0..n).map(|i| at(i, 0)).collect(), (0..n).map(first).collect(), (0..n).map(second).collect()]
+}
+
+/// Value and second derivative (per row squared) at the first row of the parabola nearest to the values.
+fn parabola(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let place = |i: usize| 2.0 * i as f64 / (n - 1.0) - 1.0;
+    let places = || (0..values.len()).map(place);
+    let square = places().map(|s| s * s).sum::<f64>() / n;
+    // Orthogonal on the rows: 1, s, s² − mean s².
+    let part = |shape: &dyn Fn(f64) -> f64| {
+        let (dot, norm) = places()
+            .zip(values)
+            .fold((0.0, 0.0), |(dot, norm), (s, x)| (dot + shape(s) * x, norm + shape(s) * shape(s)));
+        dot / norm
+    };
+    let (level, slope, bend) = (part(&|_| 1.0), part(&|s| s), part(&|s| s * s - square));
+    let per_row = 2.0 / (n - 1.0);
+    (level - slope + bend * (1.0 - square), 2.0 * bend * per_row * per_row)
 }
 
 /// Second-order low-pass section, unity gain at rest.
@@ -226,6 +250,16 @@ mod tests {
             let t = time[i];
             assert!((motion.velocity[i] / (50.0 * w) - (w * t).cos()).abs() < 1e-4);
             assert!((motion.acceleration[i] / (50.0 * w * w) + (w * t).sin()).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn a_recording_may_begin_and_end_in_full_acceleration() {
+        let time: Vec<f64> = (0..2000).map(|i| f64::from(i) * 1e-3).collect();
+        let position: Vec<f64> = time.iter().map(|t| 7.0 - 30.0 * t + 400.0 * t * t).collect();
+        let motion = Motion::with_cutoff(&time, &position, Some(60.0)).unwrap();
+        for (t, (v, a)) in time.iter().zip(motion.velocity.iter().zip(&motion.acceleration)) {
+            assert!((v - (800.0 * t - 30.0)).abs() < 0.5 && (a - 800.0).abs() < 8.0, "{t}: {v}, {a}");
         }
     }
 

@@ -1,8 +1,8 @@
 //! The digital position servo of a machine file, cycle by cycle.
 //!
 //! v = (x[i] − x[i−1])/Ts, or of the mean of two samples; e = Kp·(command − x) + ff·dcommand/dt − v; u = Kv·(e + I), limited;
-//! I += e·Ts/Ti only while not limited. Speeds in the motor's coordinate per second, u in the drive's own unit
-//! (files.md, "The servo that a machine file describes, exactly").
+//! I += e·Ts/Ti only while not limited. Speeds in the motor's coordinate per second, u in the drive's own unit. The
+//! interpolator knows its own speed, so dcommand/dt is that of the present instant, not of half a cycle ago.
 
 use crate::machine::{Servo, VelocityEstimate};
 
@@ -14,32 +14,31 @@ pub struct ServoLoop {
     /// ∫e dt/Ti, a speed.
     integral: f64,
     last: [f64; 2],
-    last_command: f64,
 }
 
 impl ServoLoop {
     /// A servo that has been following an axis at `position` and constant `velocity`, holding it with `torque`.
     #[must_use]
-    pub fn new(servo: Servo, torque_limit: f64, position: f64, command: f64, velocity: f64, torque: f64) -> ServoLoop {
+    pub fn new(servo: Servo, torque_limit: f64, position: f64, velocity: f64, torque: f64) -> ServoLoop {
         let travel = velocity * servo.period_s;
         let integral = match servo.velocity_integral_time_s {
             Some(_) if servo.velocity_gain > 0.0 => torque / servo.velocity_gain,
             _ => 0.0,
         };
         let last = [position - travel, position - 2.0 * travel];
-        ServoLoop { servo, torque_limit, integral, last, last_command: command - travel }
+        ServoLoop { servo, torque_limit, integral, last }
     }
 
-    /// One cycle: the torque that is asked for until the next one.
+    /// One cycle: the torque that is asked for until the next one, from command, commanded speed and encoder.
     #[inline]
-    pub fn cycle(&mut self, command: f64, position: f64) -> f64 {
+    pub fn cycle(&mut self, command: f64, command_speed: f64, position: f64) -> f64 {
         let servo = &self.servo;
         let rate = 1.0 / servo.period_s;
         let velocity = match servo.velocity_estimate {
             VelocityEstimate::BackwardDifference => (position - self.last[0]) * rate,
             VelocityEstimate::TwoSampleMean => (position - self.last[1]) * 0.5 * rate,
         };
-        let feedforward = servo.velocity_feedforward * (command - self.last_command) * rate;
+        let feedforward = servo.velocity_feedforward * command_speed;
         let error = servo.position_gain_1_s * (command - position) + feedforward - velocity;
         let asked = servo.velocity_gain * (error + self.integral);
         let torque = asked.clamp(-self.torque_limit, self.torque_limit);
@@ -47,7 +46,6 @@ impl ServoLoop {
             self.integral += error * servo.period_s / time;
         }
         self.last = [position, self.last[0]];
-        self.last_command = command;
         torque
     }
 }
@@ -69,39 +67,33 @@ mod tests {
     /// Two cycles worked out by hand from the format's equations.
     #[test]
     fn two_cycles_by_hand() {
-        let mut servo = ServoLoop::new(SERVO, 100.0, 0.0, 0.0, 0.0, 0.0);
-        // v = 0, e = 40·0.1 + 0.1/0.001 = 104, u = 52.
-        assert!((servo.cycle(0.1, 0.0) - 52.0).abs() < 1e-12);
+        let mut servo = ServoLoop::new(SERVO, 100.0, 0.0, 0.0, 0.0);
+        // v = 0, e = 40·0.1 + 100 = 104, u = 52.
+        assert!((servo.cycle(0.1, 100.0, 0.0) - 52.0).abs() < 1e-12);
         // v = 20, e = 40·0.08 + 0 − 20 = −16.8, I = 104·0.001/0.02 = 5.2, u = 0.5·(−11.6).
-        assert!((servo.cycle(0.1, 0.02) + 5.8).abs() < 1e-12);
+        assert!((servo.cycle(0.1, 0.0, 0.02) + 5.8).abs() < 1e-12);
         // The same rows with the two-sample mean: v = (0.02 − 0)/0.002 = 10, e = −6.8, u = 0.5·(−1.6).
-        let mut servo = ServoLoop::new(
-            Servo { velocity_estimate: VelocityEstimate::TwoSampleMean, ..SERVO },
-            100.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        );
-        servo.cycle(0.1, 0.0);
-        assert!((servo.cycle(0.1, 0.02) + 0.8).abs() < 1e-12);
+        let mut servo =
+            ServoLoop::new(Servo { velocity_estimate: VelocityEstimate::TwoSampleMean, ..SERVO }, 100.0, 0.0, 0.0, 0.0);
+        servo.cycle(0.1, 100.0, 0.0);
+        assert!((servo.cycle(0.1, 0.0, 0.02) + 0.8).abs() < 1e-12);
     }
 
     #[test]
     fn the_integral_waits_while_the_torque_is_limited() {
-        let mut servo = ServoLoop::new(SERVO, 2.0, 0.0, 0.0, 0.0, 0.0);
+        let mut servo = ServoLoop::new(SERVO, 2.0, 0.0, 0.0, 0.0);
         for _ in 0..1000 {
-            assert!((servo.cycle(1.0, 0.0) - 2.0).abs() < 1e-12);
+            assert!((servo.cycle(1.0, 0.0, 0.0) - 2.0).abs() < 1e-12);
         }
         // Back on the command, nothing has been wound up: the torque is that of the speed alone.
-        servo.cycle(1.0, 1.0);
-        assert!(servo.cycle(1.0, 1.0).abs() < 1e-12);
+        servo.cycle(1.0, 0.0, 1.0);
+        assert!(servo.cycle(1.0, 0.0, 1.0).abs() < 1e-12);
     }
 
     #[test]
     fn it_takes_over_a_moving_axis_without_a_jump() {
         let speed = 3.0;
-        let mut servo = ServoLoop::new(SERVO, 100.0, 1.0, 1.0, speed, 0.7);
-        assert!((servo.cycle(1.0, 1.0) - 0.7).abs() < 1e-9);
+        let mut servo = ServoLoop::new(SERVO, 100.0, 1.0, speed, 0.7);
+        assert!((servo.cycle(1.0, 0.0, 1.0) - 0.7).abs() < 1e-9);
     }
 }

@@ -114,7 +114,7 @@ pub fn simulate_physics(
     let table = physics.clone();
     let (position, velocity) = (start.position * scale, start.velocity * scale);
     let mut body = Body::new(physics, step_s, servo.torque_time_constant_s, position, velocity, start.torque);
-    let mut control = ServoLoop::new(servo, axis.base.torque_limit, position, first * scale, velocity, start.torque);
+    let mut control = ServoLoop::new(servo, axis.base.torque_limit, position, velocity, start.torque);
 
     // The value read is that of `late` cycles and `fine` steps ago.
     let age = (setup.sensors.delay_s / step_s).round() as usize;
@@ -129,7 +129,8 @@ pub fn simulate_physics(
         trace.time_s.push(cycle as f64 * servo.period_s);
         trace.position.push(read);
         trace.table_position.push(encoder.digitise(table.table_of(table_motor / scale), &mut noise));
-        let asked = control.cycle(target * scale, read * scale);
+        let speed = speed_of(command, cycle) / servo.period_s;
+        let asked = control.cycle(target * scale, speed * scale, read * scale);
         torques.push((asked, body.torque()));
         body.advance(asked, fine);
         if late > 0 {
@@ -143,6 +144,12 @@ pub fn simulate_physics(
         .map(|cycle| on_grid(log.at(&torques, cycle) + noise.normal(setup.sensors.torque_noise), grid))
         .collect();
     Ok(trace)
+}
+
+/// Travel per cycle of a command at a cycle: that of its neighbours, at the ends that of the one neighbour.
+fn speed_of(command: &[f64], cycle: usize) -> f64 {
+    let (before, after) = (cycle.saturating_sub(1), (cycle + 1).min(command.len() - 1));
+    if after == before { 0.0 } else { (command[after] - command[before]) / (after - before) as f64 }
 }
 
 /// Whole plant steps in a servo cycle.
