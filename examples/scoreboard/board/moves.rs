@@ -27,7 +27,8 @@ pub enum Segment {
 }
 
 /// Draws a run of about `duration` s. Every run holds a rapid across most of the stroke, a sweep each way at a middle speed,
-/// slow reversals and a dwell, in random order; the rest is filled at random. `slow_share` (0..1) asks for more slow reversals.
+/// slow reversals, a wave and a dwell, in random order; the rest is filled at random. The stroke must take a rapid no longer
+/// than an eighth of the run. `slow_share` (0..1) asks for more slow reversals.
 pub fn draw(random: &mut Random, reach: &Reach, duration: f64, slow_share: f64) -> (f64, Vec<Segment>) {
     let start = random.uniform(reach.low, reach.high);
     let mut at = start;
@@ -54,17 +55,21 @@ pub fn draw(random: &mut Random, reach: &Reach, duration: f64, slow_share: f64) 
         match kind {
             0 => {
                 // Rapids to and fro, mostly long ones.
+                let begin = time;
                 for _ in 0..random.pick(&[1, 2, 3]) {
+                    if time - begin > 0.1 * duration {
+                        break;
+                    }
                     let far = if at > 0.5 * (reach.low + reach.high) { reach.low } else { reach.high };
                     let to = at + (far - at) * random.uniform(0.5, 1.0);
-                    let speed = reach.speed * random.uniform(0.4, 1.0);
+                    let speed = reach.speed * random.uniform(0.5, 1.0);
                     push(Segment::Move { to, speed, acceleration }, &mut at, &mut time);
                     push(Segment::Dwell { time: random.uniform(0.05, 0.3) }, &mut at, &mut time);
                 }
             }
             1 => {
-                // A sweep there and back at a middle speed, no slower than an eighth of the run allows.
-                let speed = (reach.speed * random.log_uniform(0.04, 0.4)).max(4.0 * stroke / duration);
+                // A sweep there and back at a middle speed, each way in an eighth of the run at most.
+                let speed = (reach.speed * random.log_uniform(0.04, 0.4)).max(8.0 * stroke / duration);
                 let (first, second) =
                     if random.chance(0.5) { (reach.low, reach.high) } else { (reach.high, reach.low) };
                 for end in [first, second] {
@@ -88,12 +93,12 @@ pub fn draw(random: &mut Random, reach: &Reach, duration: f64, slow_share: f64) 
             }
             3 => push(Segment::Dwell { time: random.uniform(0.1, 0.5) }, &mut at, &mut time),
             _ => {
-                let frequency = random.log_uniform(0.4, 3.0);
+                let cycles = random.pick(&[2usize, 3, 5]);
+                let frequency = random.log_uniform(0.4, 3.0).max(8.0 * cycles as f64 / duration);
                 let omega = std::f64::consts::TAU * frequency;
                 let limit = (reach.speed / omega).min(0.8 * reach.acceleration / (omega * omega)).min(0.3 * stroke);
                 let way = if at + limit > reach.high { -1.0 } else { 1.0 };
                 let amplitude = way * limit * random.uniform(0.3, 1.0);
-                let cycles = random.pick(&[2usize, 3, 5]);
                 push(Segment::Wave { amplitude, frequency, cycles }, &mut at, &mut time);
             }
         }
@@ -210,6 +215,8 @@ mod tests {
                     fastest = fastest.max(v.abs());
                     slow += usize::from(v.abs() > 0.0 && v.abs() < 0.06 * REACH.speed);
                 }
+                // What every run must hold fits into it, in whatever order it is drawn.
+                assert!(segments.iter().any(|s| matches!(s, Segment::Wave { .. })), "seed {seed}");
                 // Diligence: runs are neither all slow nor all fast.
                 assert!(fastest > 0.3 * REACH.speed, "seed {seed}: {fastest}");
                 assert!(slow > 500, "seed {seed}: {slow}");

@@ -113,6 +113,9 @@ impl Rig {
                 if gearing == 1.0 { random.log_uniform(0.05, 2.0) } else { random.log_uniform(5e-4, 1e-2) },
             ),
         };
+        let duration = random.log_uniform(10.0, longest);
+        // A short run uses what part of the stroke it can cross.
+        let stroke = f64::min(stroke, 0.12 * duration * speed);
         let accelerating = inertia * acceleration / unit;
         let coulomb = accelerating * random.log_uniform(0.06, 0.4);
         let viscous = coulomb * random.log_uniform(0.15, 1.5) / (speed / unit);
@@ -167,7 +170,7 @@ impl Rig {
             column,
             reach: Reach { low, high: low + stroke, speed, acceleration },
             smoothing: if random.chance(0.5) { 0.0 } else { random.uniform(0.005, 0.04) },
-            duration: random.log_uniform(10.0, longest),
+            duration,
         }
     }
 
