@@ -7,8 +7,12 @@ mod board;
 
 use board::case::{Case, Kind, LEAST};
 use board::effects::CAUSES;
+use board::moves::Command;
 use board::outside;
 use board::random::Random;
+use board::record;
+use board::rig::{Drive, Rig, ServoGains};
+use board::truth::Truth;
 use gib::machine::Machine;
 
 /// A seed nobody has used; printed, so that a failure can be had again.
@@ -52,4 +56,56 @@ fn a_seed_gives_the_same_case_again() {
     let (a, b) = (draw(), draw());
     assert_eq!((&a.recording.torque, &a.holdout.position), (&b.recording.torque, &b.holdout.position));
     assert_ne!(a.recording.torque, a.holdout.torque);
+}
+
+/// The generator against a recording that others made: same machine, same command, nothing hidden.
+#[test]
+fn the_servo_and_machine_are_those_of_the_sample_recording() {
+    let data = std::env::var_os("GIB_DATA").map_or_else(
+        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        std::path::PathBuf::from,
+    );
+    let Ok(mut reader) = csv::Reader::from_path(data.join("rig-clean/recording.csv")) else {
+        println!("no rig-clean under {}: nothing compared", data.display());
+        return;
+    };
+    let rows: Vec<Vec<f64>> =
+        (reader.records()).map(|r| r.unwrap().iter().map(|v| v.parse().unwrap()).collect()).collect();
+    // rig-clean/machine.json, by hand.
+    let (period, lead) = (1e-3, 10.0);
+    let servo = ServoGains {
+        period,
+        position_gain: 40.0,
+        velocity_gain: 0.5277875658030852,
+        integral_time: Some(0.02),
+        feedforward: 1.0,
+        lag: 5e-4,
+        two_sample_mean: false,
+    };
+    let rig = Rig {
+        drive: Drive::BallScrew,
+        unit: lead / std::f64::consts::TAU,
+        inertia: 0.0028,
+        coulomb: 0.9,
+        viscous: 0.008,
+        constant: 0.0,
+        limit: 16.0,
+        servo,
+        encoder_step: 1e-4,
+        torque_noise: 0.0,
+        torque_step: 0.0,
+        table: None,
+        ..Rig::draw(&mut Random::new(1, 1), 10.0)
+    };
+    let position: Vec<f64> = rows.iter().map(|r| r[1]).collect();
+    let near = |i: usize| position[i.min(position.len() - 1)];
+    let speed = (0..position.len()).map(|i| (near(i + 1) - near(i.saturating_sub(1))) / (2.0 * period)).collect();
+    let run = record::run(&rig, &Truth::of(&rig), &Command { position, speed }, 1e-5, &mut Random::new(1, 1));
+    let position: Vec<f64> = run.position.iter().zip(&rows).map(|(a, r)| a - r[2]).collect();
+    let torque: Vec<f64> = run.clean_torque.iter().zip(&rows).map(|(a, r)| a - r[4]).collect();
+    let (position, torque) = (record::rms(&position), record::rms(&torque));
+    println!("apart: {:.3} µm, {torque:.4} N·m", position * 1e3);
+    // A grid of 0.1 µm and a sensor noise that is near 0.03 N·m while the axis moves; less would be suspicious.
+    assert!(position < 3e-4, "{position} mm");
+    assert!((0.02..0.06).contains(&torque), "{torque} N·m");
 }

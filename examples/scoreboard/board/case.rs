@@ -6,7 +6,7 @@
 //! the logged torque or position must differ by as much against what sensor noise and a shift of the encoder's grid make.
 
 use super::effects::{self, Effect};
-use super::moves;
+use super::moves::{self, Command};
 use super::outside::{self, Outside};
 use super::random::Random;
 use super::record::{self, Recording};
@@ -85,7 +85,7 @@ pub struct Files {
 /// One rig with its command, before anything is hidden.
 struct Bench {
     rig: Rig,
-    command: Vec<f64>,
+    command: Command,
     peak: f64,
     belief: Recording,
     /// Root mean square of what a shift of the encoder's grid changes in torque and position.
@@ -116,7 +116,8 @@ impl Bench {
             return None;
         }
         let shift = 0.37 * rig.encoder_step;
-        let moved: Vec<f64> = command.iter().map(|c| c + shift).collect();
+        let moved =
+            Command { position: command.position.iter().map(|c| c + shift).collect(), speed: command.speed.clone() };
         let twin = record::run(&rig, &Truth::of(&rig), &moved, SIZING_STEP, &mut Random::new(0, 0));
         let jitter = (
             apart(&twin.clean_torque, &belief.clean_torque, 0.0),
@@ -168,11 +169,11 @@ impl Bench {
     }
 }
 
-fn draw_command(rig: &Rig, duration: f64, slow: f64, random: &mut Random) -> Vec<f64> {
+fn draw_command(rig: &Rig, duration: f64, slow: f64, random: &mut Random) -> Command {
     let (start, segments) = moves::draw(random, &rig.reach, duration, slow);
     let mut command = moves::sample(start, &segments, rig.servo.period, duration, rig.smoothing);
     // The servo gets what the recording says, to the last digit.
-    command.iter_mut().for_each(|c| *c = (*c * 1e7).round() / 1e7);
+    command.position.iter_mut().for_each(|c| *c = (*c * 1e7).round() / 1e7);
     command
 }
 
@@ -273,7 +274,7 @@ impl Case {
         draws: usize,
     ) -> Option<Self> {
         let rig = bench.rig.clone();
-        let run = |command: &[f64], renewed: bool, random: &mut Random| {
+        let run = |command: &Command, renewed: bool, random: &mut Random| {
             let mut truth = Truth::of(&rig);
             for effect in &hidden {
                 let mut effect = effect.clone();

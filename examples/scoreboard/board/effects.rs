@@ -287,7 +287,7 @@ mod tests {
     use crate::board::{moves, record};
 
     /// A rig of each drive, with a smooth servo and a scale, and a run of it.
-    fn bench(drive: Drive) -> (Rig, Vec<f64>) {
+    fn bench(drive: Drive) -> (Rig, moves::Command) {
         let fits = |r: &Rig| r.drive == drive && r.gearing != 36.0 && r.servo.period >= 1e-3;
         let mut rig = (0..999).map(|s| Rig::draw(&mut Random::new(11, s), 10.0)).find(fits).unwrap();
         rig.table = Some(Scale { step: 1e-6, noise: 0.0, zero: 0.0 });

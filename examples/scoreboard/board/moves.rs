@@ -144,13 +144,21 @@ fn position(from: f64, s: &Segment, t: f64) -> f64 {
     }
 }
 
+/// What the interpolator gives the servo every cycle: position, and its own speed at that instant (load units, 1/s).
+pub struct Command {
+    pub position: Vec<f64>,
+    pub speed: Vec<f64>,
+}
+
 /// Samples a run at `period` s for `duration` s; `smoothing` s of moving average make S-curves (0: trapezoids).
-pub fn sample(start: f64, segments: &[Segment], period: f64, duration: f64, smoothing: f64) -> Vec<f64> {
+pub fn sample(start: f64, segments: &[Segment], period: f64, duration: f64, smoothing: f64) -> Command {
     let rows = (duration / period).round() as usize;
-    let mut raw = Vec::with_capacity(rows);
+    let (mut position_raw, mut speed_raw) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
     let (mut at, mut begin) = (start, 0.0);
     let mut rest = segments.iter();
     let mut current = rest.next();
+    // Speed by differences over a thousandth of a cycle; only a corner of a trapezoid inside that span is rounded.
+    let span = 1e-3 * period;
     for i in 0..rows {
         let t = i as f64 * period;
         while let Some(s) = current {
@@ -164,16 +172,18 @@ pub fn sample(start: f64, segments: &[Segment], period: f64, duration: f64, smoo
             begin = end;
             current = rest.next();
         }
-        raw.push(current.map_or(at, |s| position(at, s, t - begin)));
+        let on = |t: f64| current.map_or(at, |s| position(at, s, (t - begin).max(0.0)));
+        position_raw.push(on(t));
+        speed_raw.push((on(t + span) - on(t)) / span);
     }
     let width = ((smoothing / period).round() as usize).max(1);
-    let mut sum = start * width as f64;
-    let mut out = Vec::with_capacity(rows);
-    for i in 0..rows {
-        sum += raw[i] - if i >= width { raw[i - width] } else { start };
-        out.push(sum / width as f64);
-    }
-    out
+    Command { position: averaged(&position_raw, start, width), speed: averaged(&speed_raw, 0.0, width) }
+}
+
+/// Mean of the last `width` values; before the first stands `before`.
+fn averaged(raw: &[f64], before: f64, width: usize) -> Vec<f64> {
+    let value = |i: isize| if i < 0 { before } else { raw[i as usize] };
+    (0..raw.len() as isize).map(|i| (0..width as isize).map(|k| value(i - k)).sum::<f64>() / width as f64).collect()
 }
 
 #[cfg(test)]
@@ -200,9 +210,18 @@ mod tests {
             let mut r = Random::new(seed, 1);
             let (start, segments) = draw(&mut r, &REACH, 15.0, 0.3);
             for smoothing in [0.0, 0.02] {
-                let x = sample(start, &segments, 1e-3, 15.0, smoothing);
+                let Command { position: x, speed } = sample(start, &segments, 1e-3, 15.0, smoothing);
                 assert_eq!(x.len(), 15_000);
                 let (mut fastest, mut slow) = (0.0f64, 0);
+                for i in 1..x.len() - 1 {
+                    // The speed is that of the instant: within half a cycle of acceleration of both differences.
+                    let (before, after) = ((x[i] - x[i - 1]) / 1e-3, (x[i + 1] - x[i]) / 1e-3);
+                    let slack = 1.1e-3 * REACH.acceleration;
+                    assert!(
+                        speed[i] > before.min(after) - slack && speed[i] < before.max(after) + slack,
+                        "seed {seed}"
+                    );
+                }
                 for w in x.windows(3) {
                     assert!(w[0] >= REACH.low - 1e-9 && w[0] <= REACH.high + 1e-9, "seed {seed}: {}", w[0]);
                     let v = (w[1] - w[0]) / 1e-3;

@@ -2,9 +2,11 @@
 //!
 //! Per cycle of Ts: the encoder is read and the row is logged (position and torque of this instant, command of this
 //! cycle), then v = (x[i] − x[i−1])/Ts (or of the mean of two samples), e = Kp·(command − x) + ff·dcommand/dt − v,
-//! u = Kv·(e + I) within the limit, I += e·Ts/Ti unless limited; u is held for the cycle.
+//! u = Kv·(e + I) within the limit, I += e·Ts/Ti unless limited; u is held for the cycle. dcommand/dt is the speed that
+//! the interpolator has at this instant.
 
 use super::integrate::Machine;
+use super::moves::Command;
 use super::random::Random;
 use super::rig::{Rig, ServoGains};
 use super::truth::Truth;
@@ -39,19 +41,17 @@ pub struct Servo {
     limit: f64,
     integral: f64,
     before: [f64; 2],
-    command_before: f64,
 }
 
 impl Servo {
-    pub fn new(gains: ServoGains, limit: f64, x: f64, command: f64) -> Self {
-        Self { gains, limit, integral: 0.0, before: [x; 2], command_before: command }
+    pub fn new(gains: ServoGains, limit: f64, x: f64) -> Self {
+        Self { gains, limit, integral: 0.0, before: [x; 2] }
     }
 
     /// One cycle: torque to hold until the next, and whether it is limited.
-    pub fn cycle(&mut self, command: f64, x: f64) -> (f64, bool) {
+    pub fn cycle(&mut self, command: f64, rate: f64, x: f64) -> (f64, bool) {
         let g = &self.gains;
         let v = if g.two_sample_mean { 0.5 * (x - self.before[1]) } else { x - self.before[0] } / g.period;
-        let rate = (command - self.command_before) / g.period;
         let e = g.position_gain * (command - x) + g.feedforward * rate - v;
         let asked = g.velocity_gain * (e + self.integral);
         let limited = asked.abs() > self.limit;
@@ -59,7 +59,6 @@ impl Servo {
             self.integral += e * g.period / ti;
         }
         self.before = [x, self.before[0]];
-        self.command_before = command;
         (asked.clamp(-self.limit, self.limit), limited)
     }
 }
@@ -69,12 +68,12 @@ fn on_grid(x: f64, step: f64) -> f64 {
 }
 
 /// Runs the true machine under its servo along `command` (load units, one per cycle) with a plant step of at most `step` s.
-pub fn run(rig: &Rig, truth: &Truth, command: &[f64], step: f64, noise: &mut Random) -> Recording {
+pub fn run(rig: &Rig, truth: &Truth, command: &Command, step: f64, noise: &mut Random) -> Recording {
     let period = rig.servo.period;
     let steps = (period / step).ceil() as usize;
     let h = period / steps as f64;
     let machine = Machine::new(truth, rig.servo.lag);
-    let mut motion = machine.at_rest(command[0] / rig.unit);
+    let mut motion = machine.at_rest(command.position[0] / rig.unit);
     // The torque column is the torque of `delay` ago: whole rows, and steps within a row. A torque that is early is
     // logged that much later in the run, and moved up by as many rows.
     let shift = (truth.delay / h).round() as i64;
@@ -82,10 +81,10 @@ pub fn run(rig: &Rig, truth: &Truth, command: &[f64], step: f64, noise: &mut Ran
     // Step of a cycle at which the torque is caught: at the row itself, or `phase` steps before the next row.
     let catch = if phase == 0 { 0 } else { steps - phase };
 
-    let rows = command.len();
+    let rows = command.position.len();
     let mut out = Recording {
         period,
-        command: command.to_vec(),
+        command: command.position.clone(),
         position: Vec::with_capacity(rows),
         table: rig.table.map(|_| Vec::with_capacity(rows)),
         torque: Vec::new(),
@@ -95,13 +94,13 @@ pub fn run(rig: &Rig, truth: &Truth, command: &[f64], step: f64, noise: &mut Ran
         true_position: Vec::with_capacity(rows),
         limited: 0,
     };
-    let start = on_grid(command[0], rig.encoder_step) / rig.unit;
-    let mut servo = Servo::new(rig.servo, rig.limit, start, command[0] / rig.unit);
+    let start = on_grid(command.position[0], rig.encoder_step) / rig.unit;
+    let mut servo = Servo::new(rig.servo, rig.limit, start);
     // Below this speed the sign of the motion cannot be seen on the encoder.
     let still = 0.5 * rig.encoder_step / period / rig.unit;
     let mut caught = Vec::with_capacity(rows);
     let mut believed = Vec::with_capacity(rows);
-    for &c in command {
+    for (&c, &rate) in command.position.iter().zip(&command.speed) {
         let x = motion.q[0] * rig.unit;
         let seen = on_grid(x, rig.encoder_step);
         out.position.push(seen);
@@ -114,7 +113,7 @@ pub fn run(rig: &Rig, truth: &Truth, command: &[f64], step: f64, noise: &mut Ran
         let a = machine.motor_acceleration(&motion);
         let without_dry = rig.inertia * a + rig.viscous * motion.w[0] + rig.constant;
         believed.push((without_dry, if motion.w[0].abs() > still { motion.w[0].signum() } else { 0.0 }));
-        let (u, limited) = servo.cycle(c / rig.unit, seen / rig.unit);
+        let (u, limited) = servo.cycle(c / rig.unit, rate / rig.unit, seen / rig.unit);
         out.limited += usize::from(limited);
         for k in 0..steps {
             if k == catch {
@@ -138,6 +137,19 @@ pub fn run(rig: &Rig, truth: &Truth, command: &[f64], step: f64, noise: &mut Ran
 }
 
 impl Recording {
+    /// Rows in which the true speed keeps its sign and is above `least` (load units/s) for five rows either side.
+    pub fn moves(&self, least: f64) -> Vec<bool> {
+        let way = least * self.period;
+        let step = |i: usize| self.true_position[i + 1] - self.true_position[i];
+        let last = self.true_position.len().saturating_sub(1);
+        (0..=last)
+            .map(|i| {
+                let around = i.saturating_sub(5)..(i + 5).min(last);
+                around.clone().all(|j| step(j) > way) || around.clone().all(|j| step(j) < -way)
+            })
+            .collect()
+    }
+
     /// Writes the recording in the exchange format.
     pub fn write(&self, rig: &Rig, path: &Path) -> std::io::Result<()> {
         let mut file = BufWriter::new(std::fs::File::create(path)?);
@@ -178,7 +190,7 @@ mod tests {
         Rig::draw(&mut Random::new(seed, 9), 10.0)
     }
 
-    fn command(rig: &Rig) -> Vec<f64> {
+    fn command(rig: &Rig) -> Command {
         let (start, segments) = moves::draw(&mut Random::new(4, 4), &rig.reach, rig.duration, 0.3);
         moves::sample(start, &segments, rig.servo.period, rig.duration, rig.smoothing)
     }
@@ -194,22 +206,20 @@ mod tests {
             lag: 0.0,
             two_sample_mean: false,
         };
-        let mut servo = Servo::new(gains, 16.0, 0.0, 0.0);
-        // v = 0, rate = 0.01/0.001 = 10, e = 40·0.01 + 10 = 10.4, u = 0.5·10.4 = 5.2; I = 10.4·0.001/0.02 = 0.52
-        assert!((servo.cycle(0.01, 0.0).0 - 5.2).abs() < 1e-12);
-        // v = 4, rate = 10, e = 40·(0.02 − 0.004) + 10 − 4 = 6.64, u = 0.5·(6.64 + 0.52) = 3.58; I = 0.852
-        assert!((servo.cycle(0.02, 0.004).0 - 3.58).abs() < 1e-12);
+        let mut servo = Servo::new(gains, 16.0, 0.0);
+        // v = 0, e = 40·0.01 + 10 = 10.4, u = 0.5·10.4 = 5.2; I = 10.4·0.001/0.02 = 0.52
+        assert!((servo.cycle(0.01, 10.0, 0.0).0 - 5.2).abs() < 1e-12);
+        // v = 4, e = 40·(0.02 − 0.004) + 10 − 4 = 6.64, u = 0.5·(6.64 + 0.52) = 3.58; I = 0.852
+        assert!((servo.cycle(0.02, 10.0, 0.004).0 - 3.58).abs() < 1e-12);
         // Limited: e = 40·0.996 + 980 − 0 = 1019.84, u > 16, and I stays 0.852.
-        assert_eq!(servo.cycle(1.0, 0.004), (16.0, true));
-        // v = 0, rate = 0, e = 39.84, u = 0.5·(39.84 + 0.852) = 20.3 → 16 … and back at the target only I is left.
-        let back = servo.cycle(0.004, 0.004).0;
-        // rate = −996, e = −996: limited the other way; then e = 0.
-        assert_eq!(back, -16.0);
-        assert!((servo.cycle(0.004, 0.004).0 - 0.5 * 0.852).abs() < 1e-12);
+        assert_eq!(servo.cycle(1.0, 980.0, 0.004), (16.0, true));
+        // Limited the other way by e = −996; then at rest on the command only I is left.
+        assert_eq!(servo.cycle(0.004, -996.0, 0.004), (-16.0, true));
+        assert!((servo.cycle(0.004, 0.0, 0.004).0 - 0.5 * 0.852).abs() < 1e-12);
         // Mean of two samples: v = (x[i] − x[i−2])/(2·Ts) = (0.004 − 0)/0.002 = 2 in the second cycle.
-        let mut servo = Servo::new(ServoGains { two_sample_mean: true, integral_time: None, ..gains }, 16.0, 0.0, 0.0);
-        servo.cycle(0.0, 0.0);
-        assert!((servo.cycle(0.0, 0.004).0 - 0.5 * (-0.16 - 2.0)).abs() < 1e-12);
+        let mut servo = Servo::new(ServoGains { two_sample_mean: true, integral_time: None, ..gains }, 16.0, 0.0);
+        servo.cycle(0.0, 0.0, 0.0);
+        assert!((servo.cycle(0.0, 0.0, 0.004).0 - 0.5 * (-0.16 - 2.0)).abs() < 1e-12);
     }
 
     #[test]
@@ -260,7 +270,7 @@ mod tests {
         };
         let (now, late, early) = (at(0.0), at(3.0 * rig.servo.period), at(-2.0 * rig.servo.period));
         assert_eq!(now.position, late.position);
-        for i in 10..c.len() - 10 {
+        for i in 10..now.command.len() - 10 {
             assert_eq!(late.clean_torque[i], now.clean_torque[i - 3]);
             assert_eq!(early.clean_torque[i], now.clean_torque[i + 2]);
         }
@@ -270,14 +280,14 @@ mod tests {
             let (a, b) = (now.clean_torque[i - 1], now.clean_torque[i]);
             (half.clean_torque[i] - a) * (half.clean_torque[i] - b) <= 1e-9
         };
-        let share = (1..c.len()).filter(|&i| between(i)).count() as f64 / c.len() as f64;
+        let share = (1..now.command.len()).filter(|&i| between(i)).count() as f64 / now.command.len() as f64;
         assert!(share > 0.999, "{share}");
         let quarter_early = at(-0.25 * rig.servo.period);
         let forward = |i: usize| {
             let (a, b) = (now.clean_torque[i], now.clean_torque[i + 1]);
             (quarter_early.clean_torque[i] - a) * (quarter_early.clean_torque[i] - b) <= 1e-9
         };
-        let share = (0..c.len() - 1).filter(|&i| forward(i)).count() as f64 / c.len() as f64;
+        let share = (0..now.command.len() - 1).filter(|&i| forward(i)).count() as f64 / now.command.len() as f64;
         assert!(share > 0.998, "{share}");
     }
 
@@ -296,7 +306,7 @@ mod tests {
             let asked = if s.integral_time.is_some() { 0.0 } else { torque / s.velocity_gain };
             let expected = (asked + (1.0 - s.feedforward) * w) / s.position_gain * rig.unit;
             let rows = (3.0 / s.period) as usize..(3.4 / s.period) as usize;
-            let mean = rows.clone().map(|i| command[i] - r.position[i]).sum::<f64>() / rows.len() as f64;
+            let mean = rows.clone().map(|i| r.command[i] - r.position[i]).sum::<f64>() / rows.len() as f64;
             assert!(
                 (mean - expected).abs() < 0.01 * expected.abs() + 2.0 * rig.encoder_step,
                 "seed {seed}: {mean} for {expected}"

@@ -97,12 +97,13 @@ pub fn judge(case: &Case, diagnosis: &Value) -> Score {
     score
 }
 
-/// Root mean square of the column whose name holds `.residual_`.
-fn residual(path: &Path) -> Option<f64> {
+/// Root mean square of the column whose name holds `.residual_`, over the rows in which the axis moves: at rest friction
+/// takes any value, so that no motion can tell the torque.
+fn residual(path: &Path, moves: &[bool]) -> Option<f64> {
     let mut reader = csv::Reader::from_path(path).ok()?;
     let column = reader.headers().ok()?.iter().position(|h| h.contains(".residual_"))?;
     let (mut sum, mut count) = (0.0, 0);
-    for row in reader.records() {
+    for (row, _) in reader.records().zip(moves).filter(|(_, moves)| **moves) {
         let v: f64 = row.ok()?.get(column)?.parse().ok()?;
         sum += v * v;
         count += 1;
@@ -110,7 +111,7 @@ fn residual(path: &Path) -> Option<f64> {
     (count > 0).then(|| (sum / f64::from(count)).sqrt())
 }
 
-fn predict(gib: &Path, machine: &Path, recording: &Path, out: &Path) -> Option<f64> {
+fn predict(gib: &Path, machine: &Path, recording: &Path, out: &Path, moves: &[bool]) -> Option<f64> {
     let run = Command::new(gib)
         .arg("predict")
         .arg("--machine")
@@ -121,7 +122,7 @@ fn predict(gib: &Path, machine: &Path, recording: &Path, out: &Path) -> Option<f
         .arg(out)
         .output();
     run.ok().filter(|o| o.status.success())?;
-    residual(out)
+    residual(out, moves)
 }
 
 /// Diagnoses a case with the `gib` command and scores it.
@@ -155,7 +156,9 @@ pub fn diagnose(gib: &Path, case: &Case, files: &Files, folder: &Path) -> Score 
     let mut score = Score { seconds, ..judge(case, &diagnosis) };
     // Only what the files can say is compared with what is true: outside effects have no true machine file.
     if !matches!(case.kind, Kind::Outside(_)) {
-        let residual_of = |machine: &Path, name: &str| predict(gib, machine, &files.holdout, &folder.join(name));
+        let moves = case.holdout.moves(2e-3 * case.rig.reach.speed);
+        let residual_of =
+            |machine: &Path, name: &str| predict(gib, machine, &files.holdout, &folder.join(name), &moves);
         let truth = residual_of(&files.truth_machine, "predicted_truth.csv");
         let believed = residual_of(&files.machine, "predicted_belief.csv");
         let after = if extended.exists() { residual_of(&extended, "predicted_extended.csv") } else { believed };
