@@ -140,10 +140,10 @@ fn line(index: usize, case: &Case, score: Option<&Score>) -> String {
     match score {
         None => format!("{about} difference {:.1}, draws {}", case.difference, case.draws),
         Some(s) => {
-            let good = if case.effects.is_empty() {
-                s.named.is_empty()
-            } else {
-                s.first_right && s.wrong == 0 && s.found == case.effects.len()
+            let good = match case.kind {
+                Kind::Nothing => s.verdict == "no_discrepancy" && s.named.is_empty(),
+                Kind::Outside(_) => s.verdict == "unknown_cause" && s.named.is_empty(),
+                _ => s.first_right && s.wrong == 0 && s.found == case.effects.len(),
             };
             let ratio = s.against_truth.map_or(String::new(), |r| format!(", {r:.2} of true"));
             let why = s.failure.as_ref().map_or(String::new(), |f| format!(" FAILED {f}"));

@@ -20,6 +20,8 @@ pub const STEP: f64 = 1e-5;
 const SIZING_STEP: f64 = 2.5e-5;
 /// The least size that is asked for.
 pub const LEAST: f64 = 1.3;
+/// The most: beyond it nobody needs a diagnosis to see that something is wrong.
+const MOST: f64 = 40.0;
 
 /// What to hide.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -165,7 +167,7 @@ impl Bench {
             effect.amount = amount;
             size = self.size(effect)?;
         }
-        (size >= LEAST).then_some(size)
+        (LEAST..=MOST).contains(&size).then_some(size)
     }
 }
 

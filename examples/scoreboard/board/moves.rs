@@ -46,6 +46,11 @@ pub fn draw(random: &mut Random, reach: &Reach, duration: f64, slow_share: f64) 
     for i in (1..wanted.len()).rev() {
         wanted.swap(i, random.uniform(0.0, (i + 1) as f64) as usize);
     }
+    // The first leg goes far: the phase of what repeats along the stroke is read from the first quarter of a recording.
+    if let Some(far) = wanted.iter().position(|kind| *kind < 2) {
+        let last = wanted.len() - 1;
+        wanted.swap(far, last);
+    }
     while time < duration {
         let kind = wanted
             .pop()
