@@ -11,6 +11,7 @@
 //! | [`machine`] | `machine.json`: belief and effects, the vocabulary of causes |
 //! | [`plant`] | one axis under its servo: simulation and prediction |
 //! | [`analysis`] | what can be read off a recording without a model: inspection, lost motion |
+//! | [`diagnosis`] | where a simulation departs from the measurement, why, and what knowing it is worth |
 //! | [`report`] | pictures |
 //! | [`abi`] | the C surface: guard, types, one file a family; nothing but translation |
 
@@ -29,5 +30,7 @@ pub mod recording;
 
 pub mod analysis;
 pub mod report;
+
+pub mod diagnosis;
 
 pub mod abi;

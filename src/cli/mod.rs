@@ -3,6 +3,7 @@
 //! A command is a struct of arguments with `run(&self) -> cli::Result`. It returns its whole text; errors go to standard
 //! error as one sentence.
 
+mod diagnose;
 mod inspect;
 mod lost_motion;
 mod machine_file;
@@ -54,6 +55,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Diagnose(diagnose::Diagnose),
     Inspect(inspect::Inspect),
     Predict(predict::Predict),
     Program(program::Program),
@@ -64,6 +66,7 @@ enum Command {
 /// Runs the command that was asked for.
 pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
+        Command::Diagnose(command) => command.run(),
         Command::Inspect(command) => command.run(),
         Command::Predict(command) => command.run(),
         Command::Program(command) => command.run(),

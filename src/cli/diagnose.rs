@@ -1,0 +1,167 @@
+//! `gib diagnose`: what the simulation gets wrong, why, and what knowing it is worth.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use gib::diagnosis::{Diagnosis, Verdict, diagnose};
+use gib::machine::Machine;
+use gib::recording::Recording;
+
+use super::{Answer, Result};
+
+/// Names what a simulation gets wrong about a machine, from a recording
+#[derive(Args)]
+#[command(after_help = "\
+Exit codes:
+  0  a verdict was reached (no_discrepancy, explained, partly_explained)
+  1  the cause is unknown, or the data do not suffice (the text says what is missing)
+  2  wrong usage, or a file that cannot be used")]
+pub struct Diagnose {
+    /// What the simulation believes, machine.json
+    #[arg(long)]
+    machine: PathBuf,
+    /// The recording, CSV
+    #[arg(long)]
+    recording: PathBuf,
+    /// A second recording, not used for fitting, on which the gain is measured
+    #[arg(long)]
+    holdout: Option<PathBuf>,
+    /// The axis, where the machine has more than one
+    #[arg(long)]
+    axis: Option<String>,
+    /// Write the diagnosis here as JSON
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Write the machine file here, extended by what was found
+    #[arg(long)]
+    machine_out: Option<PathBuf>,
+    /// Say on standard error how far the work is
+    #[arg(long)]
+    progress: bool,
+}
+
+impl Diagnose {
+    /// Diagnoses the recording.
+    pub fn run(&self) -> Result {
+        let mut machine = Machine::load(&self.machine)?;
+        let recording = Recording::open(&self.recording)?;
+        let holdout = self.holdout.as_deref().map(Recording::open).transpose()?;
+        let channels = recording.channels();
+        let wanted = |name: &str| self.axis.as_deref().map_or_else(|| channels.contains(&name), |w| w == name);
+        let Some(axis) = machine.axes.iter_mut().find(|axis| wanted(&axis.name)) else {
+            return Err(format!(
+                "no axis to diagnose: the machine file and the recording (channels {}) share no axis{}",
+                channels.join(", "),
+                self.axis.as_ref().map_or(String::new(), |a| format!(" {a}"))
+            )
+            .into());
+        };
+        let watch = |share: f64| {
+            if self.progress {
+                eprintln!("gib diagnose: {:.0} %", 100.0 * share);
+            }
+            true
+        };
+        let Ok(diagnosis) = diagnose(axis, &recording, holdout.as_ref(), &watch) else {
+            return Err("stopped".into());
+        };
+        if let Some(file) = &self.json {
+            std::fs::write(file, format!("{:#}\n", diagnosis.to_json()))
+                .map_err(|e| format!("{}: {e}", file.display()))?;
+        }
+        *axis = diagnosis.extended.clone();
+        if let Some(file) = &self.machine_out {
+            machine.save(file)?;
+        }
+        let good = !matches!(diagnosis.verdict, Verdict::UnknownCause | Verdict::InsufficientData);
+        Ok(Answer { text: text(&diagnosis), good })
+    }
+}
+
+fn text(d: &Diagnosis) -> String {
+    let unit = if d.extended.drive.is_linear() { "N" } else { "N·m" };
+    let mut text = String::new();
+    let _ = writeln!(
+        text,
+        "Axis {}: {}",
+        d.extended.name,
+        match d.verdict {
+            Verdict::NoDiscrepancy => "no discrepancy: the machine does what the simulation believes.",
+            Verdict::Explained => "the simulation is wrong, and this is why.",
+            Verdict::PartlyExplained => "the simulation is wrong; this explains most of it.",
+            Verdict::UnknownCause => "the simulation is wrong, and no known cause fits.",
+            Verdict::InsufficientData => "the recording does not suffice.",
+        }
+    );
+    for line in &d.missing {
+        let _ = writeln!(text, "  missing: {line}");
+    }
+    if d.verdict != Verdict::InsufficientData && d.verdict != Verdict::NoDiscrepancy {
+        let shown: Vec<String> =
+            d.shown.iter().take(4).map(|(name, share)| format!("{name} {:.0} %", 100.0 * share)).collect();
+        let _ = writeln!(text, "\nThe departure goes with (share of its variance): {}", shown.join(", "));
+    }
+    for (i, finding) in d.findings.iter().enumerate() {
+        let _ = writeln!(
+            text,
+            "\n{}. {}   ({:.0} % of the discrepancy, confidence {:.1} %)",
+            i + 1,
+            finding.effect.cause(),
+            100.0 * finding.share,
+            100.0 * finding.confidence
+        );
+        let _ = writeln!(text, "   {}", finding.evidence);
+        let parameters: Vec<String> = finding
+            .effect
+            .keyed_values(d.extended.drive.is_linear())
+            .zip(&finding.deviations)
+            .map(|((key, value), std)| format!("{key} {value:.5} ± {:.2}", Short(1.96 * std)))
+            .collect();
+        let _ = writeln!(text, "   {}", parameters.join(", "));
+        for other in &finding.indistinguishable_from {
+            let _ = writeln!(text, "   this recording cannot tell it from {other}");
+        }
+        if let Some(experiment) = &finding.next_experiment {
+            let why = experiment.get("why").and_then(|w| w.as_str()).unwrap_or_default();
+            let _ = writeln!(text, "   next: {why}");
+        }
+    }
+    if !d.gains.is_empty() {
+        text.push('\n');
+    }
+    for gain in &d.gains {
+        let unit = if gain.channel.ends_with("position") { "mm" } else { unit };
+        let _ = writeln!(
+            text,
+            "{} error on rows not fitted: {:.4} → {:.4} {unit} RMS, {:.2} times better (95 %: {:.2} to {:.2})",
+            gain.channel,
+            gain.before,
+            gain.after,
+            gain.before / gain.after.max(1e-300),
+            gain.ci95[0],
+            gain.ci95[1]
+        );
+    }
+    if d.verdict != Verdict::InsufficientData {
+        let _ = writeln!(
+            text,
+            "What is left: {:.4} {unit} RMS, noise {:.4}; {}",
+            d.unexplained.torque_rms, d.unexplained.noise_rms, d.unexplained.describes
+        );
+    }
+    text
+}
+
+/// Two significant digits.
+struct Short(f64);
+
+impl std::fmt::Display for Short {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.0 == 0.0 || !self.0.is_finite() {
+            return write!(f, "{}", self.0);
+        }
+        let decimals = (1 - self.0.abs().log10().floor() as i32).clamp(0, 9) as usize;
+        write!(f, "{:.decimals$}", self.0)
+    }
+}

@@ -1,0 +1,32 @@
+//! Torque and position columns are not of one instant: the torque logged at t is that of t − delay. Looks like friction at
+//! constant acceleration and like inertia at reversals, so it is tried with the others from the start.
+
+use super::*;
+
+/// Parameter: the delay in ms. The trace is the measured torque less itself moved up; it has no coefficient.
+pub static LAW: Law = Law {
+    cause: Cause::DeadTime,
+    scales: &[Scale::Linear(-20.0, 20.0, 0.05)],
+    starts: |frame, _| {
+        let h = frame.columns.period_s * 1e3;
+        let step = (0.5 * h).max(0.2);
+        let count = (8.0 / step).round() as i32;
+        (-count..=count).filter(|i| *i != 0).map(|i| vec![f64::from(i) * step]).collect()
+    },
+    starts_from_rest: false,
+    term: |frame, shape| {
+        let moved = frame.torque(1e-3 * shape[0]);
+        let fixed = frame.torque(0.0).iter().zip(moved).map(|(a, b)| a - b).collect();
+        Term { fixed: Some(Trace::torque(fixed)), regressors: Vec::new() }
+    },
+    effect: |_, shape, _| Some(Effect::DeadTime { delay_ms: *shape.first()? }),
+    confused_with: &[Cause::InertiaMismatch, Cause::ViscousFrictionMismatch],
+    sentence: |effect, _| match effect {
+        Effect::DeadTime { delay_ms } => format!(
+            "The torque column is {} ms {} against the position column: a logging delay, not the machine.",
+            say(delay_ms.abs()),
+            if *delay_ms > 0.0 { "late" } else { "early" }
+        ),
+        _ => String::new(),
+    },
+};

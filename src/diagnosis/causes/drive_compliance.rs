@@ -1,0 +1,46 @@
+//! Elastic drive: motor and table are two masses on a spring, with the resonance ω² = k·(1/J₁ + 1/J₂). Seen from the motor,
+//! the table's inertia weighs more towards the antiresonance √(k/J₂) and less above it; at a reversal the drive winds up.
+
+use super::table_side::{self, Shares};
+use super::*;
+use std::f64::consts::TAU;
+
+/// Parameters: resonance in Hz, share of the inertia and of the friction on the table's side, damping ratio.
+pub static LAW: Law = Law {
+    cause: Cause::DriveCompliance,
+    scales: &[
+        Scale::Log(3.0, 2000.0),
+        Scale::Linear(0.04, 0.5, 0.01),
+        Scale::Linear(0.02, 0.98, 0.02),
+        Scale::Log(2e-3, 0.6),
+    ],
+    starts: |frame, _| {
+        let most = (0.25 / frame.columns.period_s).min(300.0);
+        let frequencies = log_spaced(10.0, most.max(20.0), 14);
+        frequencies.flat_map(|f| [vec![f, 0.25, 0.7, 0.04], vec![f, 0.42, 0.7, 0.04]]).collect()
+    },
+    starts_from_rest: false,
+    term: |frame, shape| match effect(frame, shape) {
+        Some(effect) => table_side::term(frame, effect, Shares { width: false }),
+        None => Term::default(),
+    },
+    effect: |frame, shape, _| effect(frame, shape),
+    confused_with: &[Cause::InertiaMismatch, Cause::Backlash, Cause::PreslidingFriction],
+    sentence: |effect, axis| match effect {
+        Effect::DriveCompliance { resonance_hz, stiffness_n_um, .. } => format!(
+            "The drive is elastic: motor and table swing against each other at {} Hz ({} N/{}), so coupling, screw or bearing gives.",
+            say(*resonance_hz),
+            say(*stiffness_n_um),
+            if axis.drive.is_rotary() { "0.001°" } else { "µm" }
+        ),
+        _ => String::new(),
+    },
+};
+
+fn effect(frame: &Frame, shape: &[f64]) -> Option<Effect> {
+    let [resonance_hz, share, table_friction_share, damping_ratio] = shape.try_into().ok()?;
+    let omega: f64 = TAU * resonance_hz;
+    let stiffness = omega * omega * frame.belief.inertia * share * (1.0 - share);
+    let stiffness_n_um = stiffness / frame.axis.drive.motor_stiffness(1.0);
+    Some(Effect::DriveCompliance { resonance_hz, stiffness_n_um, table_friction_share, damping_ratio })
+}

@@ -1,0 +1,37 @@
+//! A disturbance periodic in time, not in position: amplitude·sin(2π·f·t + phase); pumps, fans, neighbours.
+
+use super::*;
+use std::f64::consts::TAU;
+
+/// Parameter: periods over the recording. Coefficients: sine and cosine.
+pub static LAW: Law = Law {
+    cause: Cause::ExternalVibration,
+    scales: &[Scale::Linear(3.0, 1e9, 0.02)],
+    starts: |frame, rest| periods::along_time(frame, rest.torque),
+    starts_from_rest: true,
+    term: |frame, shape| {
+        let omega = TAU * shape[0] / duration(frame);
+        let sine = frame.judged_by(|i| (omega * frame.seconds(i)).sin());
+        let cosine = frame.judged_by(|i| (omega * frame.seconds(i)).cos());
+        Term { fixed: None, regressors: vec![Trace::torque(sine), Trace::torque(cosine)] }
+    },
+    effect: |frame, shape, c| {
+        let [sine, cosine] = c.try_into().ok()?;
+        let frequency_hz = shape.first()? / duration(frame);
+        Some(Effect::ExternalVibration { frequency_hz, amplitude: f64::hypot(sine, cosine) })
+    },
+    confused_with: &[Cause::Cogging, Cause::DriveCompliance],
+    sentence: |effect, axis| match effect {
+        Effect::ExternalVibration { frequency_hz, amplitude } => format!(
+            "A disturbance of ±{} {} beats at {} Hz whatever the axis does: look for a pump, a fan or a neighbouring machine.",
+            say(*amplitude),
+            unit(axis),
+            say(*frequency_hz)
+        ),
+        _ => String::new(),
+    },
+};
+
+fn duration(frame: &Frame) -> f64 {
+    frame.columns.time_s.last().map_or(1.0, |end| end - frame.columns.time_s[0])
+}

@@ -1,0 +1,179 @@
+//! The causes a diagnosis can name, one file a cause. Each knows the trace it leaves in torque and in table − encoder
+//! (its regressors), its non-linear parameters and where to start them, its physical bounds, what it is confused with,
+//! and the sentence it says to a machinist.
+
+mod backlash;
+mod cable_force;
+mod cogging;
+mod constant_torque;
+mod coulomb_friction_mismatch;
+mod dead_time;
+mod direction_dependent_friction;
+mod drive_compliance;
+mod external_vibration;
+mod inertia_mismatch;
+mod position_dependent_friction;
+mod presliding_friction;
+mod quadratic_drag;
+mod screw_periodic_error;
+mod screw_pitch_error;
+mod stribeck_friction;
+mod thermal_drift;
+mod torque_saturation;
+mod viscous_friction_mismatch;
+
+pub(super) mod periods;
+mod table_side;
+
+use super::frame::Frame;
+use crate::machine::{Axis, Cause, Effect};
+
+/// A regressor at the judged rows: what one unit of a coefficient adds.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Trace {
+    /// In the torque, drive's own unit; empty where the cause leaves none.
+    pub torque: Vec<f64>,
+    /// In table − encoder, load units; empty where the cause leaves none.
+    pub table: Vec<f64>,
+}
+
+impl Trace {
+    /// A trace in the torque alone.
+    #[must_use]
+    pub fn torque(values: Vec<f64>) -> Self {
+        Self { torque: values, table: Vec::new() }
+    }
+
+    /// A trace in table − encoder alone.
+    #[must_use]
+    pub fn table(values: Vec<f64>) -> Self {
+        Self { torque: Vec::new(), table: values }
+    }
+}
+
+/// What a cause adds at given non-linear parameters: one part of fixed size, and regressors whose coefficients are fitted.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Term {
+    /// Fixed part.
+    pub fixed: Option<Trace>,
+    /// One a coefficient.
+    pub regressors: Vec<Trace>,
+}
+
+impl Term {
+    /// One regressor in the torque.
+    #[must_use]
+    pub fn torque(values: Vec<f64>) -> Self {
+        Self { fixed: None, regressors: vec![Trace::torque(values)] }
+    }
+}
+
+/// How a non-linear parameter is searched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Scale {
+    /// Positive, by its logarithm, within bounds.
+    Log(f64, f64),
+    /// Within bounds, with a step over which the trace changes but little.
+    Linear(f64, f64, f64),
+    /// One of the starts, not refined.
+    Choice,
+}
+
+/// What is left of the measurement, for causes that look there for a start.
+#[derive(Debug)]
+pub struct Rest<'a> {
+    /// Torque at the judged rows.
+    pub torque: &'a [f64],
+    /// table − encoder at the judged rows; empty without a table scale.
+    pub table: &'a [f64],
+}
+
+/// One cause.
+pub struct Law {
+    /// Its name.
+    pub cause: Cause,
+    /// How each non-linear parameter is searched.
+    pub scales: &'static [Scale],
+    /// Starts of the non-linear parameters; none where this recording cannot show the cause.
+    pub starts: fn(&Frame, &Rest) -> Vec<Vec<f64>>,
+    /// Whether the starts depend on what is left.
+    pub starts_from_rest: bool,
+    /// The trace at given non-linear parameters.
+    pub term: fn(&Frame, &[f64]) -> Term,
+    /// The effect that parameters and coefficients stand for; `None` beyond physical bounds.
+    pub effect: fn(&Frame, &[f64], &[f64]) -> Option<Effect>,
+    /// What leaves a similar trace.
+    pub confused_with: &'static [Cause],
+    /// What it says to a machinist.
+    pub sentence: fn(&Effect, &Axis) -> String,
+}
+
+impl std::fmt::Debug for Law {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.cause.name())
+    }
+}
+
+/// All laws, in the order of the vocabulary.
+pub static LAWS: &[&Law] = &[
+    &inertia_mismatch::LAW,
+    &coulomb_friction_mismatch::LAW,
+    &viscous_friction_mismatch::LAW,
+    &constant_torque::LAW,
+    &direction_dependent_friction::LAW,
+    &stribeck_friction::LAW,
+    &presliding_friction::LAW,
+    &backlash::LAW,
+    &drive_compliance::LAW,
+    &cogging::LAW,
+    &position_dependent_friction::LAW,
+    &cable_force::LAW,
+    &quadratic_drag::LAW,
+    &thermal_drift::LAW,
+    &dead_time::LAW,
+    &external_vibration::LAW,
+    &torque_saturation::LAW,
+    &screw_pitch_error::LAW,
+    &screw_periodic_error::LAW,
+];
+
+/// The law of a cause.
+#[must_use]
+pub fn law(cause: Cause) -> &'static Law {
+    LAWS.iter().find(|law| law.cause == cause).copied().unwrap_or(&inertia_mismatch::LAW)
+}
+
+/// The start of a law without non-linear parameters.
+fn one_start(_: &Frame, _: &Rest) -> Vec<Vec<f64>> {
+    vec![Vec::new()]
+}
+
+/// `count` values from low to high, equal ratios.
+fn log_spaced(low: f64, high: f64, count: usize) -> impl Iterator<Item = f64> {
+    let ratio = (high / low).powf(1.0 / (count.max(2) - 1) as f64);
+    (0..count).map(move |i| low * ratio.powi(i as i32))
+}
+
+/// A number for a sentence: three digits.
+fn say(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let decimals = (2 - value.abs().log10().floor() as i32).clamp(0, 7) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// `N·m` or `N`.
+fn unit(axis: &Axis) -> &'static str {
+    if axis.drive.is_linear() { "N" } else { "N·m" }
+}
+
+/// `mm` or `°`.
+fn load(axis: &Axis) -> &'static str {
+    if axis.drive.is_rotary() { "°" } else { "mm" }
+}
+
+/// `µm` or thousandths of a degree.
+fn micro(axis: &Axis) -> &'static str {
+    if axis.drive.is_rotary() { "thousandths of a degree" } else { "µm" }
+}

@@ -1,0 +1,91 @@
+//! Where a rest repeats: along the stroke or in time, by matched filters over all periods at once (a Fourier transform).
+
+use super::*;
+use realfft::RealFftPlanner;
+use std::f64::consts::TAU;
+
+/// Bins along the stroke: eight to the shortest period looked for.
+const STROKE_BINS: usize = 1 << 14;
+/// Starts handed on.
+const MOST: usize = 4;
+
+/// Sine and cosine with this many periods over the stroke, every row.
+pub fn waves(frame: &Frame, periods: f64) -> (Vec<f64>, Vec<f64>) {
+    let (low, high) = frame.stroke();
+    let k = TAU * periods / (high - low);
+    frame.x.iter().map(|x| (k * (x - low)).sin_cos()).unzip()
+}
+
+/// Numbers of periods over the stroke at which the rest repeats most, and those that the drive suggests.
+pub fn along_stroke(frame: &Frame, rest: &[f64]) -> Vec<Vec<f64>> {
+    let (low, high) = frame.stroke();
+    let stroke = high - low;
+    if !(stroke > 0.0) || rest.is_empty() {
+        return Vec::new();
+    }
+    let mut bins = vec![0.0; 2 * STROKE_BINS];
+    for (&row, value) in frame.kept.iter().zip(rest) {
+        let at = ((frame.x[row] - low) / stroke * (STROKE_BINS - 1) as f64) as usize;
+        if let Some(bin) = bins.get_mut(at) {
+            *bin += value;
+        }
+    }
+    // Two transform lengths over the stroke: half periods are resolved. Periods below eight bins or eight encoder steps,
+    // and fewer than three over the stroke, are not looked for.
+    let most = (STROKE_BINS / 8).min((stroke / (8.0 * frame.grid.max(1e-9))) as usize);
+    let mut starts = peaks(&mut bins, 6, 2 * most, 0.5);
+    if let crate::machine::Drive::BallScrew { lead_mm } = frame.axis.drive {
+        let poles = f64::from(frame.axis.motor_pole_pairs.unwrap_or(4));
+        let likely = [1.0, 2.0, poles, 2.0 * poles, 6.0 * poles].map(|n| n * stroke / lead_mm);
+        starts.extend(likely.into_iter().filter(|n| *n >= 3.0 && *n < most as f64).map(|n| vec![n]));
+    }
+    starts
+}
+
+/// Numbers of periods over the recording at which the rest repeats most.
+pub fn along_time(frame: &Frame, rest: &[f64]) -> Vec<Vec<f64>> {
+    let stride = frame.kept.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(1).max(1);
+    let rows = frame.x.len() / stride + 1;
+    if rows < 64 {
+        return Vec::new();
+    }
+    let length = (2 * rows).next_power_of_two();
+    let mut bins = vec![0.0; length];
+    for (&row, value) in frame.kept.iter().zip(rest) {
+        if let Some(bin) = bins.get_mut(row / stride) {
+            *bin += value;
+        }
+    }
+    let cycles = (frame.x.len() - 1) as f64 / stride as f64 / length as f64;
+    // Ten periods at least, and nothing that the filter has taken away.
+    let most = (length as f64 * (0.45_f64).min(0.6 * stride as f64 / frame.low_pass.width as f64)) as usize;
+    peaks(&mut bins, (10.0 / cycles) as usize, most, cycles)
+}
+
+/// The largest local peaks of the power spectrum between two bins, as multiples of `unit`.
+fn peaks(values: &mut [f64], from: usize, to: usize, unit: f64) -> Vec<Vec<f64>> {
+    let fft = RealFftPlanner::<f64>::new().plan_fft_forward(values.len());
+    let mut spectrum = fft.make_output_vec();
+    if fft.process(values, &mut spectrum).is_err() {
+        return Vec::new();
+    }
+    let power: Vec<f64> = spectrum.iter().map(|c| c.norm_sqr()).collect();
+    let to = to.min(power.len().saturating_sub(1));
+    let mut found: Vec<usize> =
+        (from.max(1)..to).filter(|&i| power[i] > power[i - 1] && power[i] >= power[i + 1]).collect();
+    found.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
+    found.truncate(MOST);
+    found.into_iter().map(|i| vec![i as f64 * unit]).collect()
+}
+
+/// Where a ripple of this period comes from.
+pub fn origin(axis: &Axis, period_mm: f64) -> String {
+    if let crate::machine::Drive::BallScrew { lead_mm } = axis.drive {
+        let per_turn = lead_mm / period_mm;
+        let whole = per_turn.round();
+        if whole >= 1.0 && (per_turn - whole).abs() < 0.02 * whole {
+            return format!("{whole} times a motor turn, so it comes from the motor or the screw");
+        }
+    }
+    "magnets, slots or a gear repeat with it".to_owned()
+}

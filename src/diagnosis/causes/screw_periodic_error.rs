@@ -1,0 +1,33 @@
+//! Table and encoder differ periodically with the screw: table = encoder + amplitude·sin(2π·x/period + phase).
+
+use super::*;
+
+/// Parameter: periods over the stroke. Coefficients: sine and cosine, load units.
+pub static LAW: Law = Law {
+    cause: Cause::ScrewPeriodicError,
+    scales: &[Scale::Linear(1.5, 1e6, 0.02)],
+    starts: |frame, rest| if rest.table.is_empty() { Vec::new() } else { periods::along_stroke(frame, rest.table) },
+    starts_from_rest: true,
+    term: |frame, shape| {
+        let (sine, cosine) = periods::waves(frame, shape[0]);
+        let (sine, cosine) = (frame.judged_table(&sine), frame.judged_table(&cosine));
+        Term { fixed: None, regressors: vec![Trace::table(sine), Trace::table(cosine)] }
+    },
+    effect: |frame, shape, c| {
+        let [sine, cosine] = c.try_into().ok()?;
+        let (low, high) = frame.stroke();
+        let amplitude_um = 1e3 * f64::hypot(sine, cosine);
+        Some(Effect::ScrewPeriodicError { amplitude_um, period_mm: (high - low) / shape.first()? })
+    },
+    confused_with: &[Cause::ScrewPitchError],
+    sentence: |effect, axis| match effect {
+        Effect::ScrewPeriodicError { amplitude_um, period_mm } => format!(
+            "The table swings about the encoder by ±{} {} every {} {} of travel: the screw or its encoder runs out of true.",
+            say(*amplitude_um),
+            micro(axis),
+            say(*period_mm),
+            load(axis)
+        ),
+        _ => String::new(),
+    },
+};

@@ -1,0 +1,40 @@
+//! Extra friction at low speed: Ts·exp(−(v/vs)²)·sign(v) (Stribeck 1902; Armstrong-Hélouvry 1991). A dip where negative.
+
+use super::*;
+
+/// Trace sign(v)·exp(−(v/vs)²), vs in load units/s.
+pub static LAW: Law = Law {
+    cause: Cause::StribeckFriction,
+    scales: &[Scale::Log(1e-4, 1e4)],
+    starts: |frame, _| {
+        let top = frame.top_speed();
+        log_spaced(2e-3 * top, 0.4 * top, 12).map(|v| vec![v]).collect()
+    },
+    starts_from_rest: false,
+    term: |frame, shape| {
+        let vs = shape[0];
+        Term::torque(frame.judged_by(|i| frame.direction[i] * (-(frame.v[i] / vs).powi(2)).exp()))
+    },
+    effect: |frame, shape, c| {
+        let (torque, velocity_mm_s) = (*c.first()?, *shape.first()?);
+        let sound = torque > -1.2 * frame.belief.coulomb && velocity_mm_s < 0.6 * frame.top_speed();
+        sound.then_some(Effect::StribeckFriction { torque, velocity_mm_s })
+    },
+    confused_with: &[Cause::CoulombFrictionMismatch, Cause::PreslidingFriction],
+    sentence: |effect, axis| match effect {
+        Effect::StribeckFriction { torque, velocity_mm_s } => format!(
+            "Below about {} {}/s friction {} by {} {}: {}.",
+            say(*velocity_mm_s),
+            load(axis),
+            if *torque > 0.0 { "rises" } else { "falls" },
+            say(torque.abs()),
+            unit(axis),
+            if *torque > 0.0 {
+                "the film of oil breaks down, stick-slip threatens slow feeds"
+            } else {
+                "the axis runs easier when slow"
+            }
+        ),
+        _ => String::new(),
+    },
+};

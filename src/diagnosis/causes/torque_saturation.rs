@@ -1,0 +1,36 @@
+//! Beyond a level the motor delivers less than its current says: the measured (current) torque is larger than the motion
+//! explains by (1 − r)·(|T| − limit) beyond the limit, r the share of the excess that is delivered.
+
+use super::*;
+
+/// Parameter: the limit as a share of the largest measured torque. The coefficient is 1 − r.
+pub static LAW: Law = Law {
+    cause: Cause::TorqueSaturation,
+    scales: &[Scale::Log(0.1, 0.98)],
+    starts: |_, _| (0..9).map(|i| vec![0.3 + 0.075 * f64::from(i)]).collect(),
+    starts_from_rest: false,
+    term: |frame, shape| {
+        let limit = shape[0] * peak(frame);
+        let beyond: Vec<f64> = frame.columns.torque.iter().map(|t| t.signum() * (t.abs() - limit).max(0.0)).collect();
+        Term::torque(frame.aligned(&beyond))
+    },
+    effect: |frame, shape, c| {
+        let slope_ratio = 1.0 - c.first()?;
+        let sound = (-0.15..0.9).contains(&slope_ratio);
+        sound.then(|| Effect::TorqueSaturation { limit: shape[0] * peak(frame), slope_ratio: slope_ratio.max(0.0) })
+    },
+    confused_with: &[Cause::InertiaMismatch, Cause::QuadraticDrag],
+    sentence: |effect, axis| match effect {
+        Effect::TorqueSaturation { limit, slope_ratio } => format!(
+            "Above {} {} the motor delivers only {} % of what its current adds: magnetic saturation, hot magnets or a wrong torque constant at high current.",
+            say(*limit),
+            unit(axis),
+            say(100.0 * slope_ratio)
+        ),
+        _ => String::new(),
+    },
+};
+
+fn peak(frame: &Frame) -> f64 {
+    frame.columns.torque.iter().fold(0.0, |m: f64, t| m.max(t.abs()))
+}

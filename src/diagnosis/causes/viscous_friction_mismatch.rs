@@ -1,0 +1,24 @@
+//! The viscous slope differs from the belief: the rest grows in proportion to speed, both ways alike, ΔTv·ω.
+
+use super::*;
+
+/// Trace ω; the coefficient is the difference of the slopes.
+pub static LAW: Law = Law {
+    cause: Cause::ViscousFrictionMismatch,
+    scales: &[],
+    starts: one_start,
+    starts_from_rest: false,
+    term: |frame, _| Term::torque(frame.speed.clone()),
+    effect: |frame, _, c| Some(Effect::ViscousFrictionMismatch { slope: frame.belief.viscous + c.first()? }),
+    confused_with: &[Cause::QuadraticDrag, Cause::DirectionDependentFriction],
+    sentence: |effect, axis| match effect {
+        Effect::ViscousFrictionMismatch { slope } => format!(
+            "Friction rises with speed by {} {}, not {}: oil or grease is {} than believed.",
+            say(*slope),
+            if axis.drive.is_linear() { "N·s/m" } else { "N·m·s" },
+            say(axis.belief().viscous),
+            if *slope > axis.belief().viscous { "stiffer" } else { "thinner" }
+        ),
+        _ => String::new(),
+    },
+};

@@ -1,0 +1,403 @@
+//! Least squares over a set of causes: y = Σ fixed + Σ coefficient·regressor, torque and table − encoder stacked, each over
+//! its own noise floor, so that one sum of squares weighs both.
+//!
+//! Linear coefficients are projected out (orthonormal basis by modified Gram–Schmidt, twice); non-linear parameters go by
+//! Gauss–Newton with step halving on what is left (variable projection, Golub and Pereyra 1973).
+
+use super::causes::{Law, Rest, Scale, Term, Trace};
+use super::frame::Frame;
+
+/// A recording as one system of equations.
+#[derive(Debug)]
+pub struct Bench<'f, 'a> {
+    /// The recording.
+    pub frame: &'f Frame<'a>,
+    /// Measured less believed, stacked and scaled.
+    pub measured: Vec<f64>,
+    /// Noise floors of torque and table − encoder at the judged rows, first guess.
+    pub floors: [f64; 2],
+    /// Judged rows of the torque; those of the table follow.
+    pub rows: usize,
+    /// Orthonormal columns that are free in every fit: the zero of the table's scale.
+    free: Vec<Vec<f64>>,
+}
+
+/// A cause in a fit.
+#[derive(Debug, Clone)]
+pub struct Part {
+    /// Which.
+    pub law: &'static Law,
+    /// Non-linear parameters.
+    pub shape: Vec<f64>,
+    fixed: Option<Vec<f64>>,
+    columns: Vec<Vec<f64>>,
+}
+
+/// A fitted set of causes.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The causes.
+    pub parts: Vec<Part>,
+    /// Coefficients of each.
+    pub coefficients: Vec<Vec<f64>>,
+    /// What is left, stacked and scaled.
+    pub residual: Vec<f64>,
+    basis: Vec<Vec<f64>>,
+    rows: usize,
+}
+
+impl<'f, 'a> Bench<'f, 'a> {
+    /// Sets up the equations; `base` is the torque of everything believed, at the judged rows.
+    #[must_use]
+    pub fn new(frame: &'f Frame<'a>, base: &[f64]) -> Self {
+        let torque: Vec<f64> = frame.torque(0.0).iter().zip(base).map(|(t, b)| t - b).collect();
+        let table = frame.table_error();
+        let rows = torque.len();
+        let floors = [frame.floor(&torque, true), if table.is_empty() { 1.0 } else { frame.floor(&table, false) }];
+        let measured: Vec<f64> =
+            torque.iter().map(|t| t / floors[0]).chain(table.iter().map(|t| t / floors[1])).collect();
+        let mut free = Vec::new();
+        if !table.is_empty() {
+            let mut level = vec![0.0; measured.len()];
+            level[rows..].fill(1.0 / (table.len() as f64).sqrt());
+            free.push(level);
+        }
+        Self { frame, measured, floors, rows, free }
+    }
+
+    fn stack(&self, trace: &Trace) -> Vec<f64> {
+        let mut column = vec![0.0; self.measured.len()];
+        column.iter_mut().zip(&trace.torque).for_each(|(c, t)| *c = t / self.floors[0]);
+        column.iter_mut().skip(self.rows).zip(&trace.table).for_each(|(c, t)| *c = t / self.floors[1]);
+        column
+    }
+
+    /// A cause at given non-linear parameters.
+    #[must_use]
+    pub fn part(&self, law: &'static Law, shape: Vec<f64>) -> Part {
+        let Term { fixed, regressors } = (law.term)(self.frame, &shape);
+        let columns = regressors.iter().map(|trace| self.stack(trace)).collect();
+        Part { law, shape, fixed: fixed.map(|trace| self.stack(&trace)), columns }
+    }
+
+    /// What is left, channel by channel, in their own units.
+    #[must_use]
+    pub fn rest(&self, fit: &Fit) -> [Vec<f64>; 2] {
+        let (torque, table) = fit.residual.split_at(self.rows);
+        [torque.iter().map(|r| r * self.floors[0]).collect(), table.iter().map(|r| r * self.floors[1]).collect()]
+    }
+
+    /// Starts of a law on what is left.
+    #[must_use]
+    pub fn starts(&self, law: &Law, fit: &Fit) -> Vec<Vec<f64>> {
+        let [torque, table] = self.rest(fit);
+        (law.starts)(self.frame, &Rest { torque: &torque, table: &table })
+    }
+
+    /// Fits the coefficients of these parts.
+    #[must_use]
+    pub fn fit(&self, parts: Vec<Part>) -> Fit {
+        let mut basis = self.free.clone();
+        let mut residual = self.measured.clone();
+        for part in &parts {
+            if let Some(fixed) = &part.fixed {
+                residual.iter_mut().zip(fixed).for_each(|(r, f)| *r -= f);
+            }
+        }
+        let free = basis.len();
+        // R of the decomposition, for the coefficients.
+        let mut triangle: Vec<Vec<f64>> = Vec::new();
+        for column in parts.iter().flat_map(|part| &part.columns) {
+            let (direction, weights) = orthonormal(column, &basis);
+            basis.push(direction);
+            triangle.push(weights);
+        }
+        let mut target: Vec<f64> = Vec::with_capacity(basis.len());
+        for direction in &basis {
+            let along = dot(direction, &residual);
+            residual.iter_mut().zip(direction).for_each(|(r, d)| *r -= along * d);
+            target.push(along);
+        }
+        let count = triangle.len();
+        let mut solution = vec![0.0; count];
+        for i in (0..count).rev() {
+            let above: f64 = (i + 1..count).map(|j| triangle[j][free + i] * solution[j]).sum();
+            let diagonal = triangle[i][free + i];
+            solution[i] = if diagonal > 0.0 { (target[free + i] - above) / diagonal } else { 0.0 };
+        }
+        let mut next = solution.into_iter();
+        let coefficients = parts.iter().map(|p| next.by_ref().take(p.columns.len()).collect()).collect();
+        Fit { parts, coefficients, residual, basis, rows: self.rows }
+    }
+
+    /// Sum of squares per channel if this part joined a fit whose other parts keep their non-linear parameters.
+    #[must_use]
+    pub fn joined(&self, fit: &Fit, part: &Part) -> Vec<f64> {
+        let mut residual = fit.residual.clone();
+        let mut own: Vec<Vec<f64>> = Vec::new();
+        let clear = |column: &[f64], own: &[Vec<f64>]| {
+            let mut c = column.to_vec();
+            for direction in fit.basis.iter().chain(own) {
+                let along = dot(direction, &c);
+                c.iter_mut().zip(direction).for_each(|(c, d)| *c -= along * d);
+            }
+            c
+        };
+        if let Some(fixed) = &part.fixed {
+            let fixed = clear(fixed, &[]);
+            residual.iter_mut().zip(fixed).for_each(|(r, f)| *r -= f);
+        }
+        for column in &part.columns {
+            let mut c = clear(column, &own);
+            let length = dot(&c, &c);
+            if length > 1e-9 * dot(column, column) {
+                let scale = length.sqrt().recip();
+                c.iter_mut().for_each(|c| *c *= scale);
+                let along = dot(&c, &residual);
+                residual.iter_mut().zip(&c).for_each(|(r, d)| *r -= along * d);
+                own.push(c);
+            }
+        }
+        channel_squares(&residual, self.rows)
+    }
+
+    /// Refines the non-linear parameters of the parts from index `first` on.
+    #[must_use]
+    pub fn refine(&self, mut fit: Fit, first: usize, most: usize) -> Fit {
+        for _ in 0..most {
+            let slopes = self.slopes(&fit, first);
+            if slopes.is_empty() {
+                break;
+            }
+            let columns: Vec<&[f64]> = slopes.iter().map(|s| s.column.as_slice()).collect();
+            let steps = project(&columns, &fit.basis, &fit.residual);
+            let before = fit.squares();
+            let mut share = 1.0;
+            let mut better = None;
+            for _ in 0..4 {
+                let mut parts = fit.parts.clone();
+                let mut moved: Vec<usize> = Vec::new();
+                for (slope, step) in slopes.iter().zip(&steps) {
+                    let part = &mut parts[slope.part];
+                    let scale = part.law.scales[slope.index];
+                    part.shape[slope.index] = scale.moved(part.shape[slope.index], share * step);
+                    moved.push(slope.part);
+                }
+                moved.dedup();
+                for i in moved {
+                    parts[i] = self.part(parts[i].law, parts[i].shape.clone());
+                }
+                let next = self.fit(parts);
+                if next.squares() < before {
+                    better = Some(next);
+                    break;
+                }
+                share *= 0.3;
+            }
+            let Some(next) = better else { break };
+            let gained = 1.0 - next.squares() / before;
+            fit = next;
+            if gained < 1e-5 {
+                break;
+            }
+        }
+        fit
+    }
+
+    /// How the model's sum changes with each non-linear parameter (in the units of its scale).
+    #[must_use]
+    pub fn slopes(&self, fit: &Fit, first: usize) -> Vec<Slope> {
+        let mut slopes = Vec::new();
+        for (i, part) in fit.parts.iter().enumerate().skip(first) {
+            for (index, scale) in part.law.scales.iter().enumerate() {
+                let step = match *scale {
+                    Scale::Choice => continue,
+                    Scale::Log(..) => 0.02,
+                    Scale::Linear(_, _, step) => step,
+                };
+                let at = part.shape[index];
+                let shifted = |by: f64| {
+                    let mut shape = part.shape.clone();
+                    shape[index] = scale.moved(at, by);
+                    (self.part(part.law, shape.clone()), scale.distance(at, shape[index]))
+                };
+                let ((up, above), (down, below)) = (shifted(step), shifted(-step));
+                if above - below <= 0.0 {
+                    continue;
+                }
+                let per = 1.0 / (above - below);
+                let mut column = vec![0.0; self.measured.len()];
+                let mut add = |values: &[f64], factor: f64| {
+                    column.iter_mut().zip(values).for_each(|(c, v)| *c += factor * v);
+                };
+                if let (Some(up), Some(down)) = (&up.fixed, &down.fixed) {
+                    add(up, per);
+                    add(down, -per);
+                }
+                for ((up, down), c) in up.columns.iter().zip(&down.columns).zip(&fit.coefficients[i]) {
+                    add(up, c * per);
+                    add(down, -c * per);
+                }
+                slopes.push(Slope { part: i, index, column });
+            }
+        }
+        slopes
+    }
+}
+
+/// The derivative of the model by one non-linear parameter.
+#[derive(Debug, Clone)]
+pub struct Slope {
+    /// Index of the part.
+    pub part: usize,
+    /// Index of the parameter.
+    pub index: usize,
+    /// The derivative, stacked and scaled.
+    pub column: Vec<f64>,
+}
+
+impl Scale {
+    /// The value moved by a step, within bounds.
+    #[must_use]
+    pub fn moved(self, at: f64, step: f64) -> f64 {
+        match self {
+            Scale::Choice => at,
+            // More than a doubling at once is no small step.
+            Scale::Log(low, high) => (at * step.clamp(-0.7, 0.7).exp()).clamp(low, high),
+            Scale::Linear(low, high, unit) => (at + step.clamp(-40.0 * unit, 40.0 * unit)).clamp(low, high),
+        }
+    }
+
+    fn distance(self, from: f64, to: f64) -> f64 {
+        match self {
+            Scale::Choice => 0.0,
+            Scale::Log(..) => (to / from).ln(),
+            Scale::Linear(..) => to - from,
+        }
+    }
+
+    /// Change of the value for a small step in the scale's own unit.
+    #[must_use]
+    pub fn rate(self, at: f64) -> f64 {
+        match self {
+            Scale::Choice => 0.0,
+            Scale::Log(..) => at,
+            Scale::Linear(..) => 1.0,
+        }
+    }
+}
+
+impl Fit {
+    /// Weighted sum of squares.
+    #[must_use]
+    pub fn squares(&self) -> f64 {
+        dot(&self.residual, &self.residual)
+    }
+
+    /// Sum of squares of each channel, per row: 1 is the first guess of the noise floor.
+    #[must_use]
+    pub fn channels(&self) -> Vec<f64> {
+        channel_squares(&self.residual, self.rows)
+    }
+
+    /// The figure by which sets of causes are compared: Σ ln of the mean square of each channel.
+    #[must_use]
+    pub fn figure(&self) -> f64 {
+        figure(&self.channels())
+    }
+
+    /// Number of fitted numbers.
+    #[must_use]
+    pub fn numbers(&self) -> usize {
+        self.parts.iter().map(|p| p.columns.len() + p.shape.len()).sum()
+    }
+
+    /// Orthonormal columns of the fit, free ones first.
+    #[must_use]
+    pub fn basis(&self) -> &[Vec<f64>] {
+        &self.basis
+    }
+
+    /// The regressors of a part, stacked and scaled.
+    #[must_use]
+    pub fn columns(&self, part: usize) -> &[Vec<f64>] {
+        &self.parts[part].columns
+    }
+
+    /// What a part adds, stacked and scaled.
+    #[must_use]
+    pub fn contribution(&self, part: usize) -> Vec<f64> {
+        let p = &self.parts[part];
+        let mut sum = p.fixed.clone().unwrap_or_else(|| vec![0.0; self.residual.len()]);
+        for (column, c) in p.columns.iter().zip(&self.coefficients[part]) {
+            sum.iter_mut().zip(column).for_each(|(s, v)| *s += c * v);
+        }
+        sum
+    }
+}
+
+/// Σ ln over channels.
+#[must_use]
+pub fn figure(channels: &[f64]) -> f64 {
+    channels.iter().map(|c| c.max(1e-12).ln()).sum()
+}
+
+fn channel_squares(residual: &[f64], rows: usize) -> Vec<f64> {
+    let (torque, table) = residual.split_at(rows.min(residual.len()));
+    let mean = |part: &[f64]| dot(part, part) / part.len() as f64;
+    if table.is_empty() { vec![mean(torque)] } else { vec![mean(torque), mean(table)] }
+}
+
+/// Scalar product.
+#[must_use]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let (mut sums, a8, b8) = ([0.0; 4], a.chunks_exact(4), b.chunks_exact(4));
+    let rest: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in a8.zip(b8) {
+        for k in 0..4 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
+/// The part of a column that stands on the basis, with unit length, and its weights on basis and itself. A column that
+/// the basis already spans gives a zero column.
+fn orthonormal(column: &[f64], basis: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
+    let mut c = column.to_vec();
+    let mut weights = vec![0.0; basis.len() + 1];
+    for _ in 0..2 {
+        for (direction, weight) in basis.iter().zip(&mut weights) {
+            let along = dot(direction, &c);
+            c.iter_mut().zip(direction).for_each(|(c, d)| *c -= along * d);
+            *weight += along;
+        }
+    }
+    let length = dot(&c, &c).sqrt();
+    if length > 1e-6 * dot(column, column).sqrt() && length > 0.0 {
+        c.iter_mut().for_each(|c| *c /= length);
+        weights[basis.len()] = length;
+    } else {
+        c.fill(0.0);
+    }
+    (c, weights)
+}
+
+/// Least-squares coefficients of columns on what a basis leaves of them.
+fn project(columns: &[&[f64]], basis: &[Vec<f64>], target: &[f64]) -> Vec<f64> {
+    let mut all = basis.to_vec();
+    let mut triangle = Vec::new();
+    for column in columns {
+        let (direction, weights) = orthonormal(column, &all);
+        all.push(direction);
+        triangle.push(weights);
+    }
+    let along: Vec<f64> = all.iter().skip(basis.len()).map(|d| dot(d, target)).collect();
+    let mut solution = vec![0.0; columns.len()];
+    for i in (0..columns.len()).rev() {
+        let above: f64 = (i + 1..columns.len()).map(|j| triangle[j][basis.len() + i] * solution[j]).sum();
+        let diagonal = triangle[i][basis.len() + i];
+        solution[i] = if diagonal > 0.0 { (along[i] - above) / diagonal } else { 0.0 };
+    }
+    solution
+}

@@ -1,0 +1,349 @@
+//! A recording as the torque balance sees it: motion, direction of sliding, and the rows on which the balance can be judged.
+//!
+//! T = J·α + Tv·ω + Tc·s + T0 holds while the axis slides. At rest set-valued friction takes any value up to Tc and says
+//! nothing; rows whose filter touches a rest that the encoder cannot resolve are left out. Everything is in the motor's
+//! coordinate and the drive's own unit (N·m, rad; N, m), positions in load units (mm; degree).
+//!
+//! Timing: the servo's output is held for a cycle and the motor follows with a lag τ. Seen at the rows, a step of the output
+//! stands h/(1 − e^(−h/τ)) − h/2 after it, while the mean torque follows it by τ: the column is late by the difference,
+//! half a cycle without lag. This is known from the machine file and taken off before any dead time is looked for.
+
+use super::filter::{LowPass, convolve, norm, simpson};
+use crate::machine::{Axis, Belief};
+use std::ops::Range;
+
+/// Plain columns of one axis: what a diagnosis needs of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Columns {
+    /// s, equidistant within each stretch.
+    pub time_s: Vec<f64>,
+    /// Motor encoder, load units.
+    pub position: Vec<f64>,
+    /// Drive's own unit.
+    pub torque: Vec<f64>,
+    /// Command, load units, where recorded.
+    pub command: Option<Vec<f64>>,
+    /// Load-side scale, load units, where recorded.
+    pub table: Option<Vec<f64>>,
+    /// Stretches of whole rows without gaps.
+    pub stretches: Vec<Range<usize>>,
+    /// Row period, s.
+    pub period_s: f64,
+}
+
+/// Most rows on which causes are compared; more are thinned evenly, which costs time and gains nothing.
+const MOST_KEPT: usize = 20_000;
+/// Stretches shorter than this many filter reaches hold no judged row.
+const BLOCKS: usize = 24;
+
+/// One recording prepared for regression.
+#[derive(Debug)]
+pub struct Frame<'a> {
+    /// The axis as believed.
+    pub axis: &'a Axis,
+    /// Base values of the belief.
+    pub belief: Belief,
+    /// The columns.
+    pub columns: &'a Columns,
+    /// Motor units per load unit.
+    pub unit: f64,
+    /// The filter.
+    pub low_pass: LowPass,
+    /// Smoothed position, load units.
+    pub x: Vec<f64>,
+    /// Smoothed speed, load units/s.
+    pub v: Vec<f64>,
+    /// Direction of sliding, mean over the row: −1 to 1.
+    pub direction: Vec<f64>,
+    /// The encoder's grid, load units.
+    pub grid: f64,
+    /// By how much the torque column is late by construction of the servo, s.
+    pub known_delay_s: f64,
+    /// Rows that are judged.
+    pub kept: Vec<usize>,
+    /// First index into `kept` of each block, and the end.
+    pub blocks: Vec<usize>,
+    /// Acceleration, motor units, at the kept rows.
+    pub acceleration: Vec<f64>,
+    /// Speed, motor units, at the kept rows.
+    pub speed: Vec<f64>,
+    /// Filtered torque of every row, not aligned.
+    torque: Vec<f64>,
+    /// Deviation of the filtered torque noise that independent noise of unit deviation makes.
+    pub noise_gain: f64,
+}
+
+impl<'a> Frame<'a> {
+    /// Prepares columns for an axis; `width` of the filter is chosen from noise and grid unless given.
+    #[must_use]
+    pub fn new(axis: &'a Axis, columns: &'a Columns, width: Option<usize>) -> Self {
+        let belief = axis.belief();
+        let unit = axis.drive.motor_per_load();
+        let stretches = &columns.stretches;
+        let h = columns.period_s;
+        let grid = crate::analysis::statistics::grid(&columns.position).unwrap_or(0.0);
+        let scatter = crate::analysis::statistics::white_noise(&columns.position).unwrap_or(0.0);
+        let position_noise = (grid / 12f64.sqrt()).max(scatter);
+        let torque_noise = crate::analysis::statistics::white_noise(&columns.torque).unwrap_or(0.0);
+        let low_pass = LowPass {
+            width: width.unwrap_or_else(|| fit_width(position_noise * unit * belief.inertia / (h * h), torque_noise)),
+        };
+        let central = map_rows(columns, |x, i| (x[i + 1] - x[i - 1]) / (2.0 * h));
+        let bend = map_rows(columns, |x, i| (x[i + 1] - 2.0 * x[i] + x[i - 1]) / (h * h));
+        let x = low_pass.run(&columns.position, stretches);
+        let v = low_pass.run(&central, stretches);
+        let a = low_pass.run(&bend, stretches);
+        let resolution = grid.max(3.0 * scatter).max(1e-12);
+        let resting = resting_rows(columns, resolution);
+        let direction = direction_of(columns, &v, &a, resolution);
+        let torque = low_pass.run(&simpson(&columns.torque, stretches), stretches);
+        let kept = judged_rows(columns, &resting, low_pass.reach() + 3, low_pass.width / 2 + 1);
+        let noise_gain = norm(&convolve(&low_pass.kernel(), &[1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0]));
+        let blocks = (0..=BLOCKS).map(|b| b * kept.len() / BLOCKS).collect();
+        let acceleration = kept.iter().map(|&i| a[i] * unit).collect();
+        let speed = kept.iter().map(|&i| v[i] * unit).collect();
+        Self {
+            axis,
+            belief,
+            columns,
+            unit,
+            low_pass,
+            x,
+            v,
+            direction,
+            grid,
+            known_delay_s: known_delay(axis, h),
+            kept,
+            blocks,
+            acceleration,
+            speed,
+            torque,
+            noise_gain,
+        }
+    }
+
+    /// A regressor of every row, filtered like the torque, at the judged rows.
+    #[must_use]
+    pub fn judged(&self, values: &[f64]) -> Vec<f64> {
+        let stretches = &self.columns.stretches;
+        let filtered = self.low_pass.run(&simpson(values, stretches), stretches);
+        self.kept.iter().map(|&i| filtered[i]).collect()
+    }
+
+    /// A column of table − encoder, filtered, at the judged rows.
+    #[must_use]
+    pub fn judged_table(&self, values: &[f64]) -> Vec<f64> {
+        let filtered = self.low_pass.run(values, &self.columns.stretches);
+        self.kept.iter().map(|&i| filtered[i]).collect()
+    }
+
+    /// table − encoder at the judged rows; empty without a table scale.
+    #[must_use]
+    pub fn table_error(&self) -> Vec<f64> {
+        self.columns.table.as_ref().map_or_else(Vec::new, |table| {
+            let error: Vec<f64> = table.iter().zip(&self.columns.position).map(|(t, x)| t - x).collect();
+            self.judged_table(&error)
+        })
+    }
+
+    /// A function of the measured torque, filtered and aligned as the torque is.
+    #[must_use]
+    pub fn aligned(&self, values: &[f64]) -> Vec<f64> {
+        let stretches = &self.columns.stretches;
+        let filtered = self.low_pass.run(&simpson(values, stretches), stretches);
+        let shift = self.known_delay_s / self.columns.period_s;
+        self.kept.iter().map(|&i| cubic_at(&filtered, i as f64 + shift)).collect()
+    }
+
+    /// The regressor that a function of the row gives.
+    #[must_use]
+    pub fn judged_by(&self, value: impl Fn(usize) -> f64) -> Vec<f64> {
+        self.judged(&(0..self.x.len()).map(value).collect::<Vec<_>>())
+    }
+
+    /// The measured torque at the judged rows, if the column is late by `delay_s` beyond what is known.
+    #[must_use]
+    pub fn torque(&self, delay_s: f64) -> Vec<f64> {
+        let shift = (self.known_delay_s + delay_s) / self.columns.period_s;
+        self.kept.iter().map(|&i| cubic_at(&self.torque, i as f64 + shift)).collect()
+    }
+
+    /// Noise floor of a filtered column at the judged rows, in its unit: what white noise through the filter would be,
+    /// judged by second differences, in which slow structure is gone. `averaged` says that
+    /// the column went through the three-point mean as well, as torque does.
+    #[must_use]
+    pub fn floor(&self, values: &[f64], averaged: bool) -> f64 {
+        let stride = self.kept.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(1);
+        let mut kernel = self.low_pass.kernel();
+        if averaged {
+            kernel = convolve(&kernel, &[1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0]);
+        }
+        let correlation = |lag: usize| {
+            kernel.iter().zip(kernel.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>() / norm(&kernel).powi(2)
+        };
+        let at_spacing = |m: usize| {
+            let gain = (6.0 - 8.0 * correlation(m * stride) + 2.0 * correlation(2 * m * stride)).max(1e-6).sqrt();
+            let seconds: Vec<f64> = (m..values.len().saturating_sub(m))
+                .filter(|&k| self.kept[k + m] - self.kept[k - m] == 2 * m * stride)
+                .map(|k| (values[k - m] - 2.0 * values[k] + values[k + m]).abs())
+                .collect();
+            crate::analysis::statistics::median(&seconds).map(|median| 1.482_602 * median / gain)
+        };
+        // Noise of the encoder's grid alternates from row to row and looks large at the least spacing, structure at wide
+        // ones: the smallest estimate is the one least spoilt.
+        let estimates = [1, 2, 3, 5, 8].into_iter().filter_map(at_spacing).filter(|e| *e > 0.0);
+        estimates.fold(f64::INFINITY, f64::min).clamp(1e-12, 1e12)
+    }
+
+    /// Time from the first row, s.
+    #[must_use]
+    pub fn seconds(&self, row: usize) -> f64 {
+        self.columns.time_s[row] - self.columns.time_s[0]
+    }
+
+    /// Seconds that the judged rows stand for.
+    #[must_use]
+    pub fn judged_seconds(&self) -> f64 {
+        self.kept.len() as f64 * self.columns.period_s * (self.low_pass.width / 2 + 1) as f64
+    }
+
+    /// Fastest speed, load units/s.
+    #[must_use]
+    pub fn top_speed(&self) -> f64 {
+        self.kept.iter().fold(0.0, |m, &i| self.v[i].abs().max(m))
+    }
+
+    /// Smallest and largest position of the judged rows.
+    #[must_use]
+    pub fn stroke(&self) -> (f64, f64) {
+        self.kept.iter().fold((f64::MAX, f64::MIN), |(lo, hi), &i| (self.x[i].min(lo), self.x[i].max(hi)))
+    }
+
+    /// The belief's base torque at the judged rows.
+    #[must_use]
+    pub fn believed(&self) -> Vec<f64> {
+        let b = &self.belief;
+        let direction = self.judged(&self.direction);
+        (0..self.kept.len())
+            .map(|k| {
+                b.inertia * self.acceleration[k] + b.viscous * self.speed[k] + b.coulomb * direction[k] + b.constant
+            })
+            .collect()
+    }
+}
+
+/// Catmull–Rom cubic through equidistant values, held at the ends.
+fn cubic_at(values: &[f64], index: f64) -> f64 {
+    crate::plant::motion::cubic_at(values, index)
+}
+
+/// How late a logged torque column is against the mean torque, s (see the head of this file). Only where rows are cycles.
+fn known_delay(axis: &Axis, period_s: f64) -> f64 {
+    let Some(servo) = &axis.servo else { return 0.0 };
+    let (h, lag) = (servo.period_s, servo.torque_time_constant_s);
+    if (h / period_s - 1.0).abs() > 0.01 {
+        return 0.0;
+    }
+    let held = if lag > 0.0 { h / (1.0 - (-h / lag).exp()) } else { h };
+    held - 0.5 * h - lag
+}
+
+/// Applies a three-point rule to the position inside each stretch; end rows repeat their neighbour.
+fn map_rows(columns: &Columns, rule: impl Fn(&[f64], usize) -> f64) -> Vec<f64> {
+    let x = &columns.position;
+    let mut out = vec![0.0; x.len()];
+    for s in &columns.stretches {
+        if s.len() < 3 {
+            continue;
+        }
+        for i in s.start + 1..s.end - 1 {
+            out[i] = rule(x, i);
+        }
+        out[s.start] = out[s.start + 1];
+        out[s.end - 1] = out[s.end - 2];
+    }
+    out
+}
+
+/// Least width at which the encoder's grid, seen through the inertia, is quieter than the torque's own noise.
+fn fit_width(bend_noise: f64, torque_noise: f64) -> usize {
+    for half in 1..40 {
+        let kernel = LowPass { width: 2 * half + 1 }.kernel();
+        if bend_noise * norm(&convolve(&kernel, &[1.0, -2.0, 1.0])) <= 0.7 * torque_noise * norm(&kernel) {
+            return 2 * half + 1;
+        }
+    }
+    81
+}
+
+/// Rows at which the axis rests as far as the encoder can tell: no step for some rows, and no travel around them.
+fn resting_rows(columns: &Columns, resolution: f64) -> Vec<bool> {
+    let x = &columns.position;
+    let mut resting = vec![false; x.len()];
+    for s in &columns.stretches {
+        let mut run = s.start;
+        for i in s.start..s.end {
+            let (a, b) = (i.saturating_sub(1).max(s.start), (i + 1).min(s.end - 1));
+            let still = (x[b] - x[a]).abs() < 1.5 * resolution;
+            let ends = !still || i + 1 == s.end;
+            if ends {
+                let end = if still { i + 1 } else { i };
+                if end >= run + 3 {
+                    let net = (x[end - 1] - x[run]).abs();
+                    for r in run..end {
+                        let around = &x[r.saturating_sub(6).max(s.start)..(r + 7).min(s.end)];
+                        let low = around.iter().copied().fold(f64::MAX, f64::min);
+                        let high = around.iter().copied().fold(f64::MIN, f64::max);
+                        resting[r] = net < 3.0 * resolution || high - low < 3.0 * resolution;
+                    }
+                }
+                run = i + 1;
+            }
+        }
+    }
+    resting
+}
+
+/// Mean sign of the speed over each row. Through a fast reversal the crossing is found between rows from speed and
+/// acceleration; in slow motion the direction is that of the last resolved step.
+fn direction_of(columns: &Columns, v: &[f64], a: &[f64], resolution: f64) -> Vec<f64> {
+    let (x, h) = (&columns.position, columns.period_s);
+    let mut out = vec![0.0; x.len()];
+    for s in &columns.stretches {
+        for i in s.clone() {
+            let (before, after) = (i.saturating_sub(1).max(s.start), (i + 1).min(s.end - 1));
+            let step = x[after] - x[before];
+            let half = (0.5 * h * a[i].abs()).max(0.1 * resolution / h);
+            let smooth = (v[i] / half).clamp(-1.0, 1.0);
+            // A step that the grid cannot fake decides; the smoothed speed only places the crossing.
+            out[i] = if step.abs() > 2.5 * resolution && smooth * step < 0.0 { step.signum() } else { smooth };
+        }
+    }
+    out
+}
+
+/// Rows far enough from every rest and from the ends of their stretch, thinned to the filter's own density.
+fn judged_rows(columns: &Columns, resting: &[bool], margin: usize, stride: usize) -> Vec<usize> {
+    let mut kept = Vec::new();
+    for s in &columns.stretches {
+        if s.len() < 4 * margin {
+            continue;
+        }
+        let mut bad_until = s.start + margin;
+        let mut next_bad = s.start;
+        for i in s.start..s.end - margin {
+            next_bad = next_bad.max(i);
+            while next_bad < s.end && next_bad <= i + margin && !resting[next_bad] {
+                next_bad += 1;
+            }
+            if next_bad <= i + margin && next_bad < s.end {
+                bad_until = bad_until.max(next_bad + margin + 1);
+            }
+            if i >= bad_until && (i - s.start) % stride == 0 {
+                kept.push(i);
+            }
+        }
+    }
+    let thin = kept.len().div_ceil(MOST_KEPT).max(1);
+    kept.into_iter().step_by(thin).collect()
+}

@@ -1,0 +1,23 @@
+//! Where a simulation departs from the measurement, why, and what knowing it is worth.
+//!
+//! A recording is turned into one system of equations (`frame`: motion, direction, judged rows; `filter`: the low-pass that
+//! both sides go through). `causes` holds one law a cause; `fit` solves for a set of them, `select` finds the set,
+//! `uncertainty` says how sure its parameters are, `verdict` whether anything is to be named at all, `gain` what the
+//! extended machine is worth on rows it was not fitted to.
+//!
+//! T_measured(t + delay) = J·α + Tv·ω + Tc·sign(ω) + T0 + Σ causes, in the drive's own unit (N·m, or N for linear).
+
+pub mod causes;
+mod columns;
+pub mod experiment;
+pub mod filter;
+pub mod fit;
+pub mod frame;
+pub mod gain;
+mod json;
+pub mod select;
+pub mod uncertainty;
+pub mod verdict;
+
+pub use select::{Stopped, Watch};
+pub use verdict::{Diagnosis, Finding, Unexplained, Verdict, diagnose};

@@ -1,0 +1,245 @@
+//! Which causes: a beam of sets of causes grows by the cause that explains most, is refined jointly, and shrinks again by
+//! what is not needed.
+//!
+//! Sets are compared by Σ ln(mean square) over the channels. Residuals are strongly autocorrelated, so a cause joins only
+//! when its gain is a fair share of what is left, and is borne out on held-out contiguous blocks: the coefficients are
+//! fitted without a block and judged on it.
+
+use super::causes::{LAWS, Law};
+use super::fit::{Bench, Fit, Part, dot, figure};
+use crate::machine::Cause;
+use std::collections::HashMap;
+
+/// Sets that are carried on.
+const BEAM: usize = 2;
+/// Causes refined for each set that grows.
+const TRIED: usize = 6;
+/// Most causes in a set.
+const MOST: usize = 6;
+/// Least gain of a cause in Σ ln(mean square): 4 % of what is left. A smaller one would not be worth a machinist's time,
+/// and imperfect filters, grids and reversals make up to half of it on machines without any fault.
+pub const LEAST_GAIN: f64 = 0.04;
+/// What a further fitted number must gain where sets of causes compete.
+const NUMBER_PRICE: f64 = 0.003;
+
+/// Watches over long work: called with a share done; answers false to stop.
+pub type Watch<'w> = &'w (dyn Fn(f64) -> bool + Sync);
+
+/// The work was stopped by its caller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stopped;
+
+/// The set of causes that explains the recording best, and the runners-up for its first cause.
+#[derive(Debug)]
+pub struct Selection {
+    /// The fit.
+    pub fit: Fit,
+    /// Other sets of as many causes, best first.
+    pub rivals: Vec<Fit>,
+}
+
+/// Terms at the starts of the laws whose starts do not depend on the rest: they are made once.
+type Shelf = HashMap<Cause, Vec<Part>>;
+
+/// Selects causes on a bench.
+///
+/// # Errors
+/// [`Stopped`] when the watch said so.
+pub fn select(bench: &Bench, watch: Watch) -> Result<Selection, Stopped> {
+    let empty = bench.fit(Vec::new());
+    let shelf: Shelf = parallel(LAWS, |law| {
+        let parts = if law.starts_from_rest {
+            Vec::new()
+        } else {
+            bench.starts(law, &empty).into_iter().map(|shape| bench.part(law, shape)).collect()
+        };
+        (law.cause, parts)
+    })
+    .into_iter()
+    .collect();
+    let mut beam = vec![empty];
+    let mut best: Vec<Fit> = beam.clone();
+    let mut rivals = Vec::new();
+    for depth in 0..MOST {
+        if !watch(0.1 + 0.8 * depth as f64 / MOST as f64) {
+            return Err(Stopped);
+        }
+        let mut grown: Vec<Fit> = Vec::new();
+        for set in &beam {
+            for child in grow(bench, set, &shelf) {
+                if price(&child) < price(set) - 0.5 * LEAST_GAIN && !grown.iter().any(|f| same_causes(f, &child)) {
+                    grown.push(child);
+                }
+            }
+        }
+        grown.sort_by(|a, b| price(a).total_cmp(&price(b)));
+        let Some(first) = grown.first() else { break };
+        let last_gain = best.last().map_or(f64::INFINITY, |f| price(f) - price(first));
+        if last_gain < 0.5 * LEAST_GAIN {
+            break;
+        }
+        best.push(first.clone());
+        rivals = grown.iter().skip(1).take(4).cloned().collect();
+        grown.truncate(BEAM);
+        beam = grown;
+    }
+    let start = best.pop().unwrap_or_else(|| bench.fit(Vec::new()));
+    let fit = shrink(bench, start);
+    rivals.retain(|r| r.parts.len() == fit.parts.len() && !same_causes(r, &fit));
+    Ok(Selection { fit, rivals })
+}
+
+fn price(fit: &Fit) -> f64 {
+    fit.figure() + NUMBER_PRICE * fit.numbers() as f64
+}
+
+fn causes(fit: &Fit) -> Vec<Cause> {
+    let mut list: Vec<Cause> = fit.parts.iter().map(|p| p.law.cause).collect();
+    list.sort();
+    list
+}
+
+fn same_causes(a: &Fit, b: &Fit) -> bool {
+    causes(a) == causes(b)
+}
+
+/// The set with each of the most promising causes added, refined jointly.
+fn grow(bench: &Bench, set: &Fit, shelf: &Shelf) -> Vec<Fit> {
+    let open: Vec<&'static Law> = LAWS.iter().copied().filter(|law| may_join(set, law)).collect();
+    let mut promising: Vec<(f64, Part)> = parallel(&open, |law| {
+        let fresh: Vec<Part>;
+        let parts: &[Part] = if law.starts_from_rest {
+            fresh = bench.starts(law, set).into_iter().map(|shape| bench.part(law, shape)).collect();
+            &fresh
+        } else {
+            shelf.get(&law.cause).map_or(&[], Vec::as_slice)
+        };
+        let scored =
+            parts.iter().map(|part| (figure(&bench.joined(set, part)) + NUMBER_PRICE * part.shape.len() as f64, part));
+        scored.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(value, part)| (value, part.clone()))
+    })
+    .into_iter()
+    .flatten()
+    .collect();
+    promising.sort_by(|a, b| a.0.total_cmp(&b.0));
+    promising.truncate(TRIED);
+    parallel(&promising, |(_, part)| {
+        let mut parts = set.parts.clone();
+        parts.push(part.clone());
+        let count = set.parts.len();
+        let fit = bench.refine(bench.fit(parts), count, 6);
+        let fit = bench.refine(fit, 0, if count == 0 { 4 } else { 2 });
+        is_physical(bench, &fit).then_some(fit)
+    })
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+fn may_join(set: &Fit, law: &Law) -> bool {
+    let same = set.parts.iter().filter(|p| p.law.cause == law.cause).count();
+    same == 0 || law.cause.row().repeatable && same < 2
+}
+
+fn is_physical(bench: &Bench, fit: &Fit) -> bool {
+    fit.parts.iter().zip(&fit.coefficients).all(|(p, c)| (p.law.effect)(bench.frame, &p.shape, c).is_some())
+}
+
+/// Drops causes that the others can do without, and those that held-out blocks do not bear out.
+fn shrink(bench: &Bench, mut fit: Fit) -> Fit {
+    fit = bench.refine(fit, 0, 8);
+    while !fit.parts.is_empty() {
+        let without: Vec<Fit> = parallel(&(0..fit.parts.len()).collect::<Vec<_>>(), |&i| {
+            let mut parts = fit.parts.clone();
+            parts.remove(i);
+            let least = bench.refine(bench.fit(parts), 0, 4);
+            (is_physical(bench, &least), least)
+        })
+        .into_iter()
+        .map(|(_, least)| least)
+        .collect();
+        let weakest = without.into_iter().min_by(|a, b| price(a).total_cmp(&price(b)));
+        let Some(weakest) = weakest else { break };
+        if price(&weakest) - price(&fit) >= LEAST_GAIN && borne_out(bench, &weakest, &fit) {
+            break;
+        }
+        fit = weakest;
+    }
+    fit
+}
+
+/// Whether held-out blocks bear out what `full` gains over `less`.
+fn borne_out(bench: &Bench, less: &Fit, full: &Fit) -> bool {
+    let (a, b) = (held_out(bench, less), held_out(bench, full));
+    let gains: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
+    let mean = gains.iter().sum::<f64>() / gains.len() as f64;
+    let scatter = (gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (gains.len() as f64 - 1.0)).sqrt();
+    let in_sample = (less.squares() - full.squares()) / gains.len() as f64;
+    mean > 0.5 * in_sample && mean * (gains.len() as f64).sqrt() > 1.0 * scatter
+}
+
+/// Sum of squares of each block, predicted by coefficients that were fitted without it.
+pub(super) fn held_out(bench: &Bench, fit: &Fit) -> Vec<f64> {
+    let frame = bench.frame;
+    let basis = fit.basis();
+    let count = frame.blocks.len() - 1;
+    (0..count)
+        .map(|block| {
+            let range = frame.blocks[block]..frame.blocks[block + 1];
+            let pieces: Vec<std::ops::Range<usize>> = if fit.residual.len() > bench.rows {
+                vec![range.clone(), range.start + bench.rows..range.end + bench.rows]
+            } else {
+                vec![range]
+            };
+            // With orthonormal columns U, the held-out residual is (1 − U_b·U_bᵀ)⁻¹·r_b: solved in the small space,
+            // r_b + U_b·(1 − U_bᵀ·U_b)⁻¹·U_bᵀ·r_b.
+            let k = basis.len();
+            let mut normal = nalgebra::DMatrix::<f64>::identity(k, k);
+            let mut right = nalgebra::DVector::<f64>::zeros(k);
+            for piece in &pieces {
+                for i in 0..k {
+                    right[i] += dot(&basis[i][piece.clone()], &fit.residual[piece.clone()]);
+                    for j in 0..k {
+                        normal[(i, j)] -= dot(&basis[i][piece.clone()], &basis[j][piece.clone()]);
+                    }
+                }
+            }
+            // nalgebra's decompositions do not take an empty matrix.
+            let solved = if k == 0 { None } else { normal.lu().solve(&right) };
+            let weights = solved.unwrap_or_else(|| nalgebra::DVector::zeros(k));
+            let mut sum = 0.0;
+            for piece in pieces {
+                for row in piece {
+                    let fitted: f64 = (0..k).map(|i| basis[i][row] * weights[i]).sum();
+                    sum += (fit.residual[row] + fitted).powi(2);
+                }
+            }
+            sum
+        })
+        .collect()
+}
+
+/// Runs a function over items on two threads, answers in order.
+fn parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let next = std::sync::atomic::AtomicUsize::new(0);
+    let done = std::sync::Mutex::new(Vec::with_capacity(items.len()));
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get().min(8));
+    std::thread::scope(|scope| {
+        for _ in 0..threads.min(items.len()) {
+            scope.spawn(|| {
+                while let Some((i, item)) = {
+                    let i = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                    items.get(i).map(|item| (i, item))
+                } {
+                    let answer = work(item);
+                    if let Ok(mut list) = done.lock() {
+                        list.push((i, answer));
+                    }
+                }
+            });
+        }
+    });
+    let mut list = done.into_inner().unwrap_or_default();
+    list.sort_by_key(|entry| entry.0);
+    list.into_iter().map(|entry| entry.1).collect()
+}

@@ -1,0 +1,289 @@
+//! What may be said: nothing wrong, these causes, something unknown, or not enough data.
+//!
+//! The noise floor is read off the residual itself (second differences, in which slow structure is gone). What lies above it
+//! is the excess. Causes are named only when together they remove most of the excess; a set of causes that leaves much of
+//! it is an imitation of something that is not in the vocabulary, and is not named.
+
+use super::causes::{Law, law};
+use super::experiment;
+use super::fit::{Bench, Fit};
+use super::frame::{Columns, Frame};
+use super::gain::{Gain, gains};
+use super::select::{Selection, Stopped, Watch, select};
+use super::uncertainty;
+use crate::machine::{Axis, Cause, Effect};
+use crate::recording::Recording;
+
+/// Judged time below which nothing is said, s, and judged rows.
+const LEAST_SECONDS: f64 = 1.0;
+const LEAST_ROWS: usize = 300;
+/// Excess over the noise floor (in variance) below which a belief holds.
+const TOLERABLE_EXCESS: f64 = 0.6;
+/// Share of the excess that named causes must remove together.
+const LEAST_EXPLAINED: f64 = 0.6;
+/// Excess (in variance) that may be left for everything to count as explained.
+const LITTLE_LEFT: f64 = 0.5;
+
+/// The five answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// The belief holds.
+    NoDiscrepancy,
+    /// The causes explain the discrepancy down to the noise.
+    Explained,
+    /// The causes explain most of it.
+    PartlyExplained,
+    /// Something is there that no cause fits.
+    UnknownCause,
+    /// The recording does not suffice.
+    InsufficientData,
+}
+
+/// One named cause.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// The cause with its parameters.
+    pub effect: Effect,
+    /// Standard deviation of each parameter.
+    pub deviations: Vec<f64>,
+    /// 0 to 1.
+    pub confidence: f64,
+    /// Share of the discrepancy's variance, 0 to 1.
+    pub share: f64,
+    /// One sentence for a machinist.
+    pub evidence: String,
+    /// Causes that this recording cannot tell from it.
+    pub indistinguishable_from: Vec<Cause>,
+    /// Moves that would tell.
+    pub next_experiment: Option<serde_json::Value>,
+}
+
+/// What is left.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unexplained {
+    /// RMS of the filtered torque residual, drive's own unit.
+    pub torque_rms: f64,
+    /// Its noise floor.
+    pub noise_rms: f64,
+    /// Where it lives, in words.
+    pub describes: String,
+    /// Share of the residual's variance that each coordinate explains.
+    pub lives_in: Vec<(&'static str, f64)>,
+}
+
+/// The whole answer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diagnosis {
+    /// In a word.
+    pub verdict: Verdict,
+    /// Named causes, largest share first.
+    pub findings: Vec<Finding>,
+    /// What the extended machine is worth, a channel each.
+    pub gains: Vec<Gain>,
+    /// What is left.
+    pub unexplained: Unexplained,
+    /// The residual of the belief by coordinate, before any naming.
+    pub shown: Vec<(&'static str, f64)>,
+    /// What is missing, where the data do not suffice.
+    pub missing: Vec<String>,
+    /// The axis with its effects.
+    pub extended: Axis,
+}
+
+/// Diagnoses an axis on a recording; with a hold-out, the gain is measured there.
+///
+/// # Errors
+/// [`Stopped`] when `watch` answers false.
+pub fn diagnose(
+    axis: &Axis,
+    recording: &Recording,
+    holdout: Option<&Recording>,
+    watch: Watch,
+) -> Result<Diagnosis, Stopped> {
+    let columns = match Columns::of(recording, axis) {
+        Ok(columns) => columns,
+        Err(why) => return Ok(insufficient(axis, vec![why.to_string()])),
+    };
+    let frame = Frame::new(axis, &columns, None);
+    let missing = what_is_missing(&frame);
+    if !missing.is_empty() {
+        return Ok(insufficient(axis, missing));
+    }
+    if !watch(0.05) {
+        return Err(Stopped);
+    }
+    let bench = Bench::new(&frame, &frame.believed());
+    let empty = bench.fit(Vec::new());
+    let selection = select(&bench, watch)?;
+    let before = Excess::of(&bench, &empty, &selection.fit);
+    let after = Excess::of(&bench, &selection.fit, &selection.fit);
+    let explained = before.explained_by(&after);
+    let (verdict, fit) = if selection.fit.parts.is_empty() {
+        (if before.largest() > TOLERABLE_EXCESS { Verdict::UnknownCause } else { Verdict::NoDiscrepancy }, &empty)
+    } else if before.largest() > TOLERABLE_EXCESS && explained < LEAST_EXPLAINED {
+        (Verdict::UnknownCause, &empty)
+    } else if after.largest() > LITTLE_LEFT {
+        (Verdict::PartlyExplained, &selection.fit)
+    } else {
+        (Verdict::Explained, &selection.fit)
+    };
+    let findings = findings(&bench, fit, &selection, &empty);
+    let mut effects = axis.effects.clone();
+    effects.extend(findings.iter().map(|f| f.effect));
+    let extended = axis.with_effects(effects);
+    if !watch(0.95) {
+        return Err(Stopped);
+    }
+    let gains = gains(axis, &extended, recording, holdout, &bench, &empty, fit);
+    let shown = experiment::lives_in(&bench, &empty);
+    let lives_in = experiment::lives_in(&bench, fit);
+    let [rest, _] = bench.rest(fit);
+    let unexplained = Unexplained {
+        torque_rms: rms(&rest),
+        noise_rms: frame.floor(&rest, true),
+        describes: experiment::describe(&lives_in, Excess::of(&bench, fit, fit).largest()),
+        lives_in,
+    };
+    Ok(Diagnosis { verdict, findings, gains, unexplained, shown, missing: Vec::new(), extended })
+}
+
+fn insufficient(axis: &Axis, missing: Vec<String>) -> Diagnosis {
+    Diagnosis {
+        verdict: Verdict::InsufficientData,
+        findings: Vec::new(),
+        gains: Vec::new(),
+        unexplained: Unexplained {
+            torque_rms: 0.0,
+            noise_rms: 0.0,
+            describes: "not judged".into(),
+            lives_in: Vec::new(),
+        },
+        shown: Vec::new(),
+        missing,
+        extended: axis.clone(),
+    }
+}
+
+fn what_is_missing(frame: &Frame) -> Vec<String> {
+    let mut missing = Vec::new();
+    if frame.kept.len() < LEAST_ROWS || frame.judged_seconds() < LEAST_SECONDS {
+        missing.push(format!(
+            "motion: only {:.2} s of the recording are steady enough sliding to be judged, {LEAST_SECONDS} s are needed; record several moves there and back",
+            frame.judged_seconds()
+        ));
+        return missing;
+    }
+    let forward = frame.kept.iter().filter(|&&i| frame.v[i] > 0.0).count();
+    let fewer = forward.min(frame.kept.len() - forward);
+    if fewer * 50 < frame.kept.len() {
+        missing.push("both directions: the axis moves one way only, so friction and weight cannot be told apart; record moves there and back".into());
+    }
+    missing
+}
+
+/// Variance above the noise floor, a channel each, in units of the floor's variance.
+struct Excess {
+    channels: Vec<f64>,
+}
+
+impl Excess {
+    /// The excess of a fit; the floor is that of the best fit.
+    fn of(bench: &Bench, fit: &Fit, best: &Fit) -> Excess {
+        let (rest, floor) = (bench.rest(fit), bench.rest(best));
+        let channels = (0..2)
+            .filter(|&c| !rest[c].is_empty())
+            .map(|c| (rms(&rest[c]) / bench.frame.floor(&floor[c], c == 0)).powi(2) - 1.0)
+            .collect();
+        Excess { channels }
+    }
+
+    fn largest(&self) -> f64 {
+        self.channels.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Share of this excess that is gone in the other, of the channel that had most.
+    fn explained_by(&self, after: &Excess) -> f64 {
+        let worst = |a: f64, b: f64| if a > TOLERABLE_EXCESS { 1.0 - b.max(0.0) / a } else { 1.0 };
+        self.channels.iter().zip(&after.channels).map(|(a, b)| worst(*a, *b)).fold(1.0, f64::min)
+    }
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+fn findings(bench: &Bench, fit: &Fit, selection: &Selection, empty: &Fit) -> Vec<Finding> {
+    let effects = uncertainty::effects(bench, fit);
+    let total = 1.0 - (fit.squares() / empty.squares()).min(1.0);
+    let drops: Vec<f64> = (0..fit.parts.len())
+        .map(|i| {
+            let mut parts = fit.parts.clone();
+            parts.remove(i);
+            (bench.fit(parts).squares() - fit.squares()).max(0.0)
+        })
+        .collect();
+    let sum = drops.iter().sum::<f64>().max(1e-300);
+    let mut list: Vec<Finding> = Vec::new();
+    for (i, found) in effects.into_iter().enumerate() {
+        let Some((effect, deviations)) = found else { continue };
+        let law: &Law = law(effect.cause());
+        let ties = ties(bench, fit, selection, i);
+        list.push(Finding {
+            evidence: (law.sentence)(&effect, bench.frame.axis),
+            confidence: confidence(bench, fit, i),
+            share: (drops[i] / sum * total).clamp(0.0, 1.0),
+            next_experiment: ties.first().map(|other| experiment::telling(bench.frame, effect.cause(), *other)),
+            indistinguishable_from: ties,
+            effect,
+            deviations,
+        });
+    }
+    list.sort_by(|a, b| b.share.total_cmp(&a.share));
+    list
+}
+
+/// Probability that the cause's gain is not chance: Student's t over blocks, as a normal's tail.
+fn confidence(bench: &Bench, fit: &Fit, part: usize) -> f64 {
+    let mut parts = fit.parts.clone();
+    parts.remove(part);
+    let t = block_t(bench, &bench.fit(parts), fit);
+    // Logistic approximation of the normal distribution.
+    (1.0 / (1.0 + (-1.702 * t).exp())).clamp(0.0, 0.9999)
+}
+
+/// Mean over scatter of the blocks' gains, times √blocks.
+fn block_t(bench: &Bench, less: &Fit, full: &Fit) -> f64 {
+    let blocks = &bench.frame.blocks;
+    let gains: Vec<f64> = blocks
+        .windows(2)
+        .map(|w| {
+            let square = |fit: &Fit| {
+                let torque: f64 = fit.residual[w[0]..w[1]].iter().map(|r| r * r).sum();
+                let table = fit.residual.get(w[0] + bench.rows..w[1] + bench.rows).unwrap_or(&[]);
+                torque + table.iter().map(|r| r * r).sum::<f64>()
+            };
+            square(less) - square(full)
+        })
+        .collect();
+    let n = gains.len() as f64;
+    let mean = gains.iter().sum::<f64>() / n;
+    let scatter = (gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+    mean * n.sqrt() / scatter.max(1e-300)
+}
+
+/// Causes that take the place of a part without a difference that the blocks bear out.
+fn ties(bench: &Bench, fit: &Fit, selection: &Selection, part: usize) -> Vec<Cause> {
+    let own = fit.parts[part].law.cause;
+    let others: Vec<Cause> = fit.parts.iter().map(|p| p.law.cause).collect();
+    let mut list = Vec::new();
+    for rival in &selection.rivals {
+        let strange: Vec<Cause> = rival.parts.iter().map(|p| p.law.cause).filter(|c| !others.contains(c)).collect();
+        let lacks_own = !rival.parts.iter().any(|p| p.law.cause == own);
+        if let ([other], true) = (strange.as_slice(), lacks_own) {
+            if block_t(bench, rival, fit) < 2.0 && rival.figure() - fit.figure() < 0.02 && !list.contains(other) {
+                list.push(*other);
+            }
+        }
+    }
+    list
+}
