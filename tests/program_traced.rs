@@ -29,6 +29,7 @@ impl Stop {
     }
 }
 
+#[allow(clippy::zombie_processes)] // waitpid has reaped what ran to its end
 /// Runs a command under ptrace; `go_on` sees every stop and kills the command by saying no. True if it ran to its end.
 fn traced(command: &mut Command, mut go_on: impl FnMut(&Stop) -> bool) -> bool {
     // SAFETY: ptrace is a plain system call, as is allowed between fork and exec.
