@@ -9,7 +9,7 @@ use std::ops::Range;
 /// What a line is for the head.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// Blank, a comment, an assignment or a modal G code without motion: the head goes on.
+    /// Blank, a comment, an assignment or a setting without motion: the head goes on.
     Head,
     /// `%`, `%O1234(NAME)` or Okuma's `$PART.MIN%`; `numbered` where a program number stands on the same line.
     TapeMark { numbered: bool },
@@ -149,14 +149,14 @@ fn is_assignment(code: &[u8]) -> bool {
     name.iter().take(2).filter(|byte| byte.is_ascii_alphabetic()).count() == 2 && cursor.peek() == Some(b'=')
 }
 
-/// G codes alone (and Okuma's `G15 H1`), none of them the motions G0 to G3.
+/// Settings alone: G codes but for the motions G0 to G3, feed, speed and offsets (`G50 S2000`, `G15 H1`).
 fn is_modal(code: &[u8]) -> bool {
     let mut cursor = Cursor { bytes: code, at: 0 };
     loop {
         cursor.skip_blanks();
         let letter = match cursor.peek() {
             None => return true,
-            Some(letter @ (b'G' | b'H')) => letter,
+            Some(letter @ (b'G' | b'H' | b'F' | b'S' | b'D')) => letter,
             Some(_) => return false,
         };
         cursor.at += 1;
@@ -465,9 +465,11 @@ mod tests {
             ("T1 M6", Kind::Body),
             ("X=VC1", Kind::Body),
             ("G01 X=VC1", Kind::Body),
-            ("G50 S2000", Kind::Body),
+            ("G50 S2000", Kind::Head),
             ("NAT01", Kind::Body),
             ("M30", Kind::Body),
+            ("F100.5", Kind::Head),
+            ("G65 P9010", Kind::Body),
             ("IF [#1 EQ 2] GOTO 3", Kind::Body),
             ("CALL O100", Kind::Body),
             ("\u{e9}", Kind::Body),
