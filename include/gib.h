@@ -219,6 +219,46 @@
 #define GIB_ERR_BACKLASH_TORQUE_SIGN (-107)
 
 /**
+ * The program's head holds no such value: it must be measured.
+ */
+#define GIB_ERR_PROGRAM_ABSENT (-900)
+
+/**
+ * An INA statement in the head is not a finite positive number; field `line` names its line.
+ */
+#define GIB_ERR_PROGRAM_VALUE (-901)
+
+/**
+ * A value stands twice in the head; `low` and `high` are the two lines.
+ */
+#define GIB_ERR_PROGRAM_DUPLICATE (-902)
+
+/**
+ * The program is a symbolic link, through which nothing is written.
+ */
+#define GIB_ERR_PROGRAM_LINK (-903)
+
+/**
+ * The path names a folder, a device or a pipe.
+ */
+#define GIB_ERR_PROGRAM_NOT_A_FILE (-904)
+
+/**
+ * Another writer did not finish in time.
+ */
+#define GIB_ERR_PROGRAM_BUSY (-905)
+
+/**
+ * Another program changes the file all the time; nothing was written.
+ */
+#define GIB_ERR_PROGRAM_CHANGED (-906)
+
+/**
+ * The program's owner could not be kept; nothing was written.
+ */
+#define GIB_ERR_PROGRAM_OWNER (-907)
+
+/**
  * Slow-feed mode (default): the motor is fed slowly and the torque read in every cycle. The more accurate one.
  */
 #define GIB_BACKLASH_SLOW_FEED 0
@@ -337,9 +377,39 @@
 #define GIB_ABI_VERSION 1
 
 /**
+ * Spell a new value as the program's own dialect is recognised.
+ */
+#define GIB_PROGRAM_DIALECT_DETECT 0
+
+/**
+ * Spell a new value as LinuxCNC's parameter `#<_ina>=0.5`.
+ */
+#define GIB_PROGRAM_DIALECT_LINUXCNC 1
+
+/**
+ * Spell a new value as the OSP variable `INA=0.5`; steps 1 to 9 only.
+ */
+#define GIB_PROGRAM_DIALECT_OKUMA 2
+
+/**
+ * Spell a new value as the comment `(INA=0.5)`.
+ */
+#define GIB_PROGRAM_DIALECT_ISO 3
+
+/**
+ * Bytes that hold every text of `gib_program_last_error_text`, with its NUL.
+ */
+#define GIB_PROGRAM_TEXT_SIZE 512
+
+/**
  * A lost-motion measurement of one axis. Opaque; its size is `gib_backlash_size()`.
  */
 typedef struct gib_backlash gib_backlash;
+
+/**
+ * Reads and writes part programs, and keeps why the last call failed. Opaque; its size is `gib_program_size()`.
+ */
+typedef struct gib_program gib_program;
 
 /**
  * What to measure and within which bounds. Zero in a field means its default; fields marked "required" have none.
@@ -815,6 +885,46 @@ typedef struct gib_api_table {
      * See gib_backlash_last_error.
      */
     int32_t (*backlash_last_error)(const struct gib_backlash *handle, struct gib_error_detail *detail);
+    /**
+     * See gib_program_size.
+     */
+    uintptr_t (*program_size)(void);
+    /**
+     * See gib_program_init_in.
+     */
+    int32_t (*program_init_in)(void *memory, uintptr_t size, struct gib_program **out);
+    /**
+     * See gib_program_new.
+     */
+    struct gib_program *(*program_new)(void);
+    /**
+     * See gib_program_free.
+     */
+    void (*program_free)(struct gib_program *handle);
+    /**
+     * See gib_program_get.
+     */
+    int32_t (*program_get)(struct gib_program *handle, const char *path, uint32_t step, double *inertia_kg_m2);
+    /**
+     * See gib_program_set.
+     */
+    int32_t (*program_set)(struct gib_program *handle,
+                           const char *path,
+                           uint32_t step,
+                           double inertia_kg_m2,
+                           int32_t dialect);
+    /**
+     * See gib_program_remove.
+     */
+    int32_t (*program_remove)(struct gib_program *handle, const char *path, uint32_t step);
+    /**
+     * See gib_program_last_error.
+     */
+    int32_t (*program_last_error)(const struct gib_program *handle, struct gib_error_detail *detail);
+    /**
+     * See gib_program_last_error_text.
+     */
+    int32_t (*program_last_error_text)(const struct gib_program *handle, char *text, uintptr_t size);
 } gib_api_table;
 
 #ifdef __cplusplus
@@ -1057,6 +1167,155 @@ int32_t gib_backlash_compare(struct gib_backlash *handle,
  * `handle` is NULL or an instance; `detail` is NULL or writable.
  */
 int32_t gib_backlash_last_error(const struct gib_backlash *handle, struct gib_error_detail *detail);
+
+/**
+ * Bytes that an instance needs in memory of your own, to be aligned to 16.
+ *
+ * @return the size in bytes, below 1 KiB.
+ *
+ * [thread: any] [real-time: yes] [state: any]
+ */
+uintptr_t gib_program_size(void);
+
+/**
+ * Makes an instance in memory of your own. There is nothing to free; zero or reuse the memory when done.
+ *
+ * @param memory at least `gib_program_size()` bytes, aligned to 16; stays yours.
+ * @param size bytes at `memory`.
+ * @param out receives the handle; NULL on error.
+ * @return GIB_OK; GIB_ERR_NULL; GIB_ERR_MEMORY when too small or misaligned.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ *
+ * # Safety
+ * `memory` is NULL or points to `size` writable bytes; `out` is NULL or writable.
+ */
+int32_t gib_program_init_in(void *memory, uintptr_t size, struct gib_program **out);
+
+/**
+ * Makes an instance in memory that gib allocates.
+ *
+ * @return the handle, to be given to `gib_program_free`; NULL when there is no memory.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ */
+struct gib_program *gib_program_new(void);
+
+/**
+ * Frees an instance made by `gib_program_new`. NULL is allowed and does nothing.
+ *
+ * @param handle an instance from `gib_program_new`, never one from `gib_program_init_in`.
+ *
+ * [thread: setup] [real-time: no] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or came from `gib_program_new` and was not freed before.
+ */
+void gib_program_free(struct gib_program *handle);
+
+/**
+ * Reads INA from the head of a part program: when it is there, measuring is skipped.
+ *
+ * All spellings are read: `#<_ina>=0.5`, `INA=0.5`, `(INA=0.5)`; for step 2 `INA2`. No more than the head is read;
+ * a symbolic link is followed. The head must be sound as a whole, also where it speaks of other steps.
+ *
+ * @param handle the instance.
+ * @param path the program, NUL-terminated, in the file system's encoding.
+ * @param step process step 1 to 9999; 0 for the whole program. A step without a value of its own is absent, also
+ * where the whole program has one.
+ * @param inertia_kg_m2 receives the inertia, kg·m², finite and above 0; 0 on any error.
+ * @return GIB_OK; GIB_ERR_PROGRAM_ABSENT when it must be measured; GIB_ERR_PROGRAM_VALUE, GIB_ERR_PROGRAM_DUPLICATE,
+ * GIB_ERR_PROGRAM_NOT_A_FILE, GIB_ERR_FORMAT for NUL bytes or UTF-16, GIB_ERR_IO, GIB_ERR_CONFIG for another step,
+ * GIB_ERR_NULL, GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
+ *
+ * [thread: setup] [real-time: no] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `path` is NULL or NUL-terminated; `inertia_kg_m2` is NULL or writable.
+ */
+int32_t gib_program_get(struct gib_program *handle,
+                        const char *path,
+                        uint32_t step,
+                        double *inertia_kg_m2);
+
+/**
+ * Writes INA into the head of a part program; no other byte changes. Touches nothing when the value is there.
+ *
+ * The program is replaced whole or not at all, also when the power fails, with its owner, group, mode and access list.
+ * Waits for another writer for 60 s at most.
+ *
+ * @param handle the instance.
+ * @param path the program, NUL-terminated, in the file system's encoding; not a symbolic link.
+ * @param step process step 1 to 9999; 0 for the whole program.
+ * @param inertia_kg_m2 the inertia, 1e-9 to 1e9 kg·m².
+ * @param dialect GIB_PROGRAM_DIALECT_...: how a new value is spelled; one that is there keeps its spelling.
+ * @return GIB_OK; GIB_ERR_CONFIG for a step, inertia or dialect out of range; GIB_ERR_PROGRAM_VALUE,
+ * GIB_ERR_PROGRAM_DUPLICATE, GIB_ERR_PROGRAM_LINK, GIB_ERR_PROGRAM_NOT_A_FILE, GIB_ERR_PROGRAM_BUSY,
+ * GIB_ERR_PROGRAM_CHANGED, GIB_ERR_PROGRAM_OWNER, GIB_ERR_FORMAT for NUL bytes or UTF-16, GIB_ERR_IO,
+ * GIB_ERR_NULL, GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
+ *
+ * [thread: setup] [real-time: no] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `path` is NULL or NUL-terminated.
+ */
+int32_t gib_program_set(struct gib_program *handle,
+                        const char *path,
+                        uint32_t step,
+                        double inertia_kg_m2,
+                        int32_t dialect);
+
+/**
+ * Removes INA from the head of a part program: the line when nothing else stands on it, else only the statement.
+ *
+ * What is not there is as good as removed. The program is replaced as by gib_program_set.
+ *
+ * @param handle the instance.
+ * @param path the program, NUL-terminated, in the file system's encoding; not a symbolic link.
+ * @param step process step 1 to 9999; 0 for the whole program.
+ * @return as gib_program_set.
+ *
+ * [thread: setup] [real-time: no] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `path` is NULL or NUL-terminated.
+ */
+int32_t gib_program_remove(struct gib_program *handle,
+                           const char *path,
+                           uint32_t step);
+
+/**
+ * Why the last call failed: code, field, value and bounds.
+ *
+ * Field `line` has the line of the program as value; for GIB_ERR_PROGRAM_DUPLICATE `low` and `high` are the two lines.
+ *
+ * @param handle the instance.
+ * @param detail receives it; its `code` is GIB_OK when the last call did its work.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `detail` is NULL or writable.
+ */
+int32_t gib_program_last_error(const struct gib_program *handle,
+                               struct gib_error_detail *detail);
+
+/**
+ * Why the last call failed, as a sentence for the operator that quotes the line at fault, UTF-8.
+ *
+ * @param handle the instance.
+ * @param text receives the sentence and its NUL.
+ * @param size bytes at `text`; GIB_PROGRAM_TEXT_SIZE always suffices.
+ * @return GIB_OK; GIB_ERR_BUFFER when `size` is too small (then as much as fits is written); GIB_ERR_NULL,
+ * GIB_ERR_HANDLE.
+ *
+ * [thread: setup] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `text` is NULL or points to `size` writable bytes.
+ */
+int32_t gib_program_last_error_text(const struct gib_program *handle, char *text, uintptr_t size);
 
 /**
  * The table of all functions, so that `dlsym` needs one name: "gib_api".

@@ -70,6 +70,23 @@ pub const GIB_ERR_BACKLASH_MOTOR_FRICTION: i32 = -106;
 /// The torque falls where it should rise: its sign does not agree with the position's.
 pub const GIB_ERR_BACKLASH_TORQUE_SIGN: i32 = -107;
 
+/// The program's head holds no such value: it must be measured.
+pub const GIB_ERR_PROGRAM_ABSENT: i32 = -900;
+/// An INA statement in the head is not a finite positive number; field `line` names its line.
+pub const GIB_ERR_PROGRAM_VALUE: i32 = -901;
+/// A value stands twice in the head; `low` and `high` are the two lines.
+pub const GIB_ERR_PROGRAM_DUPLICATE: i32 = -902;
+/// The program is a symbolic link, through which nothing is written.
+pub const GIB_ERR_PROGRAM_LINK: i32 = -903;
+/// The path names a folder, a device or a pipe.
+pub const GIB_ERR_PROGRAM_NOT_A_FILE: i32 = -904;
+/// Another writer did not finish in time.
+pub const GIB_ERR_PROGRAM_BUSY: i32 = -905;
+/// Another program changes the file all the time; nothing was written.
+pub const GIB_ERR_PROGRAM_CHANGED: i32 = -906;
+/// The program's owner could not be kept; nothing was written.
+pub const GIB_ERR_PROGRAM_OWNER: i32 = -907;
+
 /// Every status and the sentence that explains it.
 const TEXTS: &[(i32, &str)] = &[
     (GIB_OK, "ok\0"),
@@ -104,6 +121,14 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_BACKLASH_SHAPE, "the torque curve is not a release, a clearance and a wind-up\0"),
     (GIB_ERR_BACKLASH_MOTOR_FRICTION, "motor-side friction could not be told from the wind-up\0"),
     (GIB_ERR_BACKLASH_TORQUE_SIGN, "torque and position have opposite signs\0"),
+    (GIB_ERR_PROGRAM_ABSENT, "the program's head holds no such value: it must be measured\0"),
+    (GIB_ERR_PROGRAM_VALUE, "an INA statement is not a finite positive number\0"),
+    (GIB_ERR_PROGRAM_DUPLICATE, "an INA value stands twice in the program's head\0"),
+    (GIB_ERR_PROGRAM_LINK, "the program is a symbolic link: nothing is written through it\0"),
+    (GIB_ERR_PROGRAM_NOT_A_FILE, "the path does not name a file\0"),
+    (GIB_ERR_PROGRAM_BUSY, "another writer of the program did not finish in time\0"),
+    (GIB_ERR_PROGRAM_CHANGED, "another program changes the file all the time; nothing was written\0"),
+    (GIB_ERR_PROGRAM_OWNER, "the program's owner could not be kept; nothing was written\0"),
 ];
 
 /// The text of a status, NUL-terminated and static; for an unknown number a text that says so.

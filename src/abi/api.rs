@@ -5,6 +5,7 @@
 //! signatures, and `tests/header.rs` fails when an exported function is not here.
 
 use super::backlash::*;
+use super::program::*;
 use super::types::GibErrorDetail;
 use super::{GIB_ABI_VERSION, gib_abi_version, gib_status_text, gib_version};
 use crate::cycle::backlash::config::BacklashConfig;
@@ -68,6 +69,32 @@ pub struct GibApiTable {
     ) -> i32,
     /// See gib_backlash_last_error.
     pub backlash_last_error: unsafe extern "C" fn(handle: *const GibBacklash, detail: *mut GibErrorDetail) -> i32,
+
+    /// See gib_program_size.
+    pub program_size: extern "C" fn() -> usize,
+    /// See gib_program_init_in.
+    pub program_init_in: unsafe extern "C" fn(memory: *mut c_void, size: usize, out: *mut *mut GibProgram) -> i32,
+    /// See gib_program_new.
+    pub program_new: extern "C" fn() -> *mut GibProgram,
+    /// See gib_program_free.
+    pub program_free: unsafe extern "C" fn(handle: *mut GibProgram),
+    /// See gib_program_get.
+    pub program_get:
+        unsafe extern "C" fn(handle: *mut GibProgram, path: *const c_char, step: u32, inertia_kg_m2: *mut f64) -> i32,
+    /// See gib_program_set.
+    pub program_set: unsafe extern "C" fn(
+        handle: *mut GibProgram,
+        path: *const c_char,
+        step: u32,
+        inertia_kg_m2: f64,
+        dialect: i32,
+    ) -> i32,
+    /// See gib_program_remove.
+    pub program_remove: unsafe extern "C" fn(handle: *mut GibProgram, path: *const c_char, step: u32) -> i32,
+    /// See gib_program_last_error.
+    pub program_last_error: unsafe extern "C" fn(handle: *const GibProgram, detail: *mut GibErrorDetail) -> i32,
+    /// See gib_program_last_error_text.
+    pub program_last_error_text: unsafe extern "C" fn(handle: *const GibProgram, text: *mut c_char, size: usize) -> i32,
 }
 
 static API: GibApiTable = GibApiTable {
@@ -91,6 +118,16 @@ static API: GibApiTable = GibApiTable {
     backlash_curve: gib_backlash_curve,
     backlash_compare: gib_backlash_compare,
     backlash_last_error: gib_backlash_last_error,
+
+    program_size: gib_program_size,
+    program_init_in: gib_program_init_in,
+    program_new: gib_program_new,
+    program_free: gib_program_free,
+    program_get: gib_program_get,
+    program_set: gib_program_set,
+    program_remove: gib_program_remove,
+    program_last_error: gib_program_last_error,
+    program_last_error_text: gib_program_last_error_text,
 };
 
 /// The table of all functions, so that `dlsym` needs one name: "gib_api".

@@ -8,6 +8,7 @@
 pub mod api;
 pub mod backlash;
 pub mod guard;
+pub mod program;
 pub mod types;
 
 use crate::error::status_text;

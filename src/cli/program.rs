@@ -121,12 +121,8 @@ impl Get {
 
 fn json(entries: &[Entry]) -> serde_json::Result<String> {
     let values = entries.iter().map(|entry| {
-        let step = match entry.scope {
-            Scope::Program => 0,
-            Scope::Step(step) => step,
-        };
-        let (inertia, line, dialect) = (entry.inertia_kg_m2, entry.line, entry.dialect.to_string());
-        json!({ "step": step, "inertia_kg_m2": inertia, "line": line, "dialect": dialect })
+        let (step, dialect) = (entry.scope.number(), entry.dialect.to_string());
+        json!({ "step": step, "inertia_kg_m2": entry.inertia_kg_m2, "line": entry.line, "dialect": dialect })
     });
     Ok(serde_json::to_string_pretty(&values.collect::<Vec<_>>())? + "\n")
 }

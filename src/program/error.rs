@@ -1,6 +1,11 @@
 //! What can go wrong with INA in a part program, in sentences for the person at the machine.
 
 use super::{INERTIA_RANGE_KG_M2, Scope};
+use crate::error::{
+    Fault, GIB_ERR_CONFIG, GIB_ERR_FORMAT, GIB_ERR_IO, GIB_ERR_PROGRAM_BUSY, GIB_ERR_PROGRAM_CHANGED,
+    GIB_ERR_PROGRAM_DUPLICATE, GIB_ERR_PROGRAM_LINK, GIB_ERR_PROGRAM_NOT_A_FILE, GIB_ERR_PROGRAM_OWNER,
+    GIB_ERR_PROGRAM_VALUE,
+};
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -83,35 +88,37 @@ impl Error {
         Error { path: path.to_owned(), problem }
     }
 
-    /// The lines that the problem names, first and second; 0 where there is none.
+    /// The status number with the value and bounds behind it, for callers that cannot read sentences.
+    ///
+    /// Field `line` has the line as value; for a value that stands twice `low` and `high` are the two lines.
     #[must_use]
-    pub fn lines(&self) -> (u64, u64) {
+    pub fn fault(&self) -> Fault {
+        let of = |code, field, value, low, high| Fault { code, field, value, low, high };
+        let line = |number: &u64| *number as f64;
         match &self.problem {
-            Problem::Statement { line, .. } => (*line, 0),
-            Problem::Duplicate { first, second, .. } => (first.0, second.0),
-            _ => (0, 0),
+            Problem::Io { .. } => Fault::of(GIB_ERR_IO),
+            Problem::NotAFile => Fault::of(GIB_ERR_PROGRAM_NOT_A_FILE),
+            Problem::Link { .. } => Fault::of(GIB_ERR_PROGRAM_LINK),
+            Problem::NotText { .. } => Fault::of(GIB_ERR_FORMAT),
+            Problem::Statement { line: at, .. } => of(GIB_ERR_PROGRAM_VALUE, "line\0", line(at), line(at), line(at)),
+            Problem::Duplicate { first, second, .. } => {
+                of(GIB_ERR_PROGRAM_DUPLICATE, "line\0", line(&first.0), line(&first.0), line(&second.0))
+            }
+            Problem::Inertia(value) => {
+                let (low, high) = INERTIA_RANGE_KG_M2;
+                of(GIB_ERR_CONFIG, "inertia_kg_m2\0", *value, low, high)
+            }
+            Problem::OkumaStep(scope) => of(GIB_ERR_CONFIG, "step\0", f64::from(scope.number()), 0.0, 9.0),
+            Problem::Busy { .. } => Fault::of(GIB_ERR_PROGRAM_BUSY),
+            Problem::Changed => Fault::of(GIB_ERR_PROGRAM_CHANGED),
+            Problem::Owner { .. } => Fault::of(GIB_ERR_PROGRAM_OWNER),
         }
     }
 }
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.path.display())?;
-        match &self.problem {
-            Problem::Statement { line, text, reason } => {
-                write!(
-                    f,
-                    ":{line}: `{text}`: {reason}; correct or delete this line. \
-                     INA is the inertia in kg·m², a positive number with a decimal point, as INA=0.5"
-                )
-            }
-            Problem::Duplicate { scope, first, second } => write!(
-                f,
-                ":{}: `{}` and line {}: `{}`: {scope} stands twice in the head; delete one of them",
-                first.0, first.1, second.0, second.1
-            ),
-            problem => write!(f, ": {problem}"),
-        }
+        write!(f, "{}: {}", self.path.display(), self.problem)
     }
 }
 
@@ -128,10 +135,16 @@ impl fmt::Display for Problem {
             Problem::NotText { found } => {
                 write!(f, "holds {found}, so it is no part program in plain bytes; nothing was changed")
             }
-            Problem::Statement { line, text, reason } => write!(f, "line {line}: `{text}`: {reason}"),
-            Problem::Duplicate { scope, first, second } => {
-                write!(f, "{scope} stands twice, in line {} and line {}", first.0, second.0)
-            }
+            Problem::Statement { line, text, reason } => write!(
+                f,
+                "line {line}: `{text}`: {reason}; correct or delete this line. \
+                 INA is the inertia in kg·m², a positive number with a decimal point, as INA=0.5"
+            ),
+            Problem::Duplicate { scope, first, second } => write!(
+                f,
+                "line {}: `{}` and line {}: `{}`: {scope} stands twice in the head; delete one of them",
+                first.0, first.1, second.0, second.1
+            ),
             Problem::Inertia(value) => {
                 let (low, high) = INERTIA_RANGE_KG_M2;
                 write!(f, "an inertia of {value} kg·m² cannot be written; {low:e} to {high:e} kg·m² is allowed")

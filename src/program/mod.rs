@@ -54,6 +54,15 @@ impl Scope {
             _ => None,
         }
     }
+
+    /// The step's number; 0 for the whole program.
+    #[must_use]
+    pub fn number(self) -> u16 {
+        match self {
+            Scope::Program => 0,
+            Scope::Step(step) => step,
+        }
+    }
 }
 
 impl fmt::Display for Scope {
