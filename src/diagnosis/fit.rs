@@ -54,8 +54,12 @@ impl<'f, 'a> Bench<'f, 'a> {
         let table = frame.table_error();
         let rows = torque.len();
         let floors = [frame.floor(&torque, true), if table.is_empty() { 1.0 } else { frame.floor(&table, false) }];
-        let measured: Vec<f64> =
-            torque.iter().map(|t| t / floors[0]).chain(table.iter().map(|t| t / floors[1])).collect();
+        let measured: Vec<f64> = torque
+            .iter()
+            .zip(&frame.weights)
+            .map(|(t, w)| w * t / floors[0])
+            .chain(table.iter().map(|t| t / floors[1]))
+            .collect();
         let mut free = Vec::new();
         if !table.is_empty() {
             let mut level = vec![0.0; measured.len()];
@@ -67,7 +71,8 @@ impl<'f, 'a> Bench<'f, 'a> {
 
     fn stack(&self, trace: &Trace) -> Vec<f64> {
         let mut column = vec![0.0; self.measured.len()];
-        column.iter_mut().zip(&trace.torque).for_each(|(c, t)| *c = t / self.floors[0]);
+        let weighted = trace.torque.iter().zip(&self.frame.weights);
+        column.iter_mut().zip(weighted).for_each(|(c, (t, w))| *c = w * t / self.floors[0]);
         column.iter_mut().skip(self.rows).zip(&trace.table).for_each(|(c, t)| *c = t / self.floors[1]);
         column
     }
@@ -80,7 +85,7 @@ impl<'f, 'a> Bench<'f, 'a> {
         Part { law, shape, fixed: fixed.map(|trace| self.stack(&trace)), columns }
     }
 
-    /// What is left, channel by channel, in their own units.
+    /// What is left, channel by channel, in their own units; rows of the torque by their weight.
     #[must_use]
     pub fn rest(&self, fit: &Fit) -> [Vec<f64>; 2] {
         let (torque, table) = fit.residual.split_at(self.rows);
@@ -336,10 +341,10 @@ impl Fit {
     }
 }
 
-/// Σ ln over channels.
+/// Σ ln(mean square + 0.1) over channels: what is gained well below the noise floor counts little.
 #[must_use]
 pub fn figure(channels: &[f64]) -> f64 {
-    channels.iter().map(|c| c.max(1e-12).ln()).sum()
+    channels.iter().map(|c| (c + 0.1).ln()).sum()
 }
 
 fn channel_squares(residual: &[f64], rows: usize) -> Vec<f64> {

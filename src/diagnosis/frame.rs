@@ -32,8 +32,10 @@ pub struct Columns {
 }
 
 /// Most rows on which causes are compared; more are thinned evenly, which costs time and gains nothing.
-const MOST_KEPT: usize = 20_000;
-/// Stretches shorter than this many filter reaches hold no judged row.
+const MOST_KEPT: usize = 12_000;
+/// Rows of less weight are not judged: nothing is known of their friction.
+const LEAST_WEIGHT: f64 = 0.05;
+/// Contiguous blocks for held-out judgement.
 const BLOCKS: usize = 24;
 
 /// One recording prepared for regression.
@@ -61,6 +63,8 @@ pub struct Frame<'a> {
     pub known_delay_s: f64,
     /// Rows that are judged.
     pub kept: Vec<usize>,
+    /// Weight of each judged row in the torque balance, mean square 1: less where friction may have been at rest.
+    pub weights: Vec<f64>,
     /// First index into `kept` of each block, and the end.
     pub blocks: Vec<usize>,
     /// Acceleration, motor units, at the kept rows.
@@ -97,7 +101,15 @@ impl<'a> Frame<'a> {
         let resting = resting_rows(columns, resolution);
         let direction = direction_of(columns, &v, &a, resolution);
         let torque = low_pass.run(&simpson(&columns.torque, stretches), stretches);
-        let kept = judged_rows(columns, &resting, low_pass.reach() + 3, low_pass.width / 2 + 1);
+        let doubt = low_pass.run(&doubtful_rows(columns, resting, resolution), stretches);
+        let level = belief.coulomb.max(1e-3 * typical(&columns.torque)) / torque_noise.max(1e-300);
+        let kernel_norm = norm(&low_pass.kernel());
+        let weight_of = |row: usize| 1.0 / (1.0 + (level * doubt[row] / kernel_norm).powi(2)).sqrt();
+        let kept =
+            judged_rows(columns, low_pass.reach() + 3, low_pass.width / 2 + 1, |row| weight_of(row) > LEAST_WEIGHT);
+        let mut weights: Vec<f64> = kept.iter().map(|&row| weight_of(row)).collect();
+        let mean = (weights.iter().map(|w| w * w).sum::<f64>() / weights.len().max(1) as f64).sqrt();
+        weights.iter_mut().for_each(|w| *w /= mean.max(LEAST_WEIGHT));
         let noise_gain = norm(&convolve(&low_pass.kernel(), &[1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0]));
         let blocks = (0..=BLOCKS).map(|b| b * kept.len() / BLOCKS).collect();
         let acceleration = kept.iter().map(|&i| a[i] * unit).collect();
@@ -114,6 +126,7 @@ impl<'a> Frame<'a> {
             grid,
             known_delay_s: known_delay(axis, h),
             kept,
+            weights,
             blocks,
             acceleration,
             speed,
@@ -192,7 +205,13 @@ impl<'a> Frame<'a> {
         // Noise of the encoder's grid alternates from row to row and looks large at the least spacing, structure at wide
         // ones: the smallest estimate is the one least spoilt.
         let estimates = [1, 2, 3, 5, 8].into_iter().filter_map(at_spacing).filter(|e| *e > 0.0);
-        estimates.fold(f64::INFINITY, f64::min).clamp(1e-12, 1e12)
+        let noise = estimates.fold(f64::INFINITY, f64::min).clamp(1e-12, 1e12);
+        if averaged {
+            return noise;
+        }
+        // The grids of two position sensors do not average out where the axis creeps.
+        let grid = self.columns.table.as_ref().and_then(|t| crate::analysis::statistics::grid(t)).unwrap_or(0.0);
+        noise.max(grid.hypot(self.grid) / 12f64.sqrt())
     }
 
     /// Time from the first row, s.
@@ -322,26 +341,40 @@ fn direction_of(columns: &Columns, v: &[f64], a: &[f64], resolution: f64) -> Vec
     out
 }
 
-/// Rows far enough from every rest and from the ends of their stretch, thinned to the filter's own density.
-fn judged_rows(columns: &Columns, resting: &[bool], margin: usize, stride: usize) -> Vec<usize> {
+/// How far the direction of friction is open at each row, 0 to 1: at rest, and at a turn as long as the encoder shows no way
+/// back, since the axis may stick there for a moment.
+fn doubtful_rows(columns: &Columns, resting: Vec<bool>, resolution: f64) -> Vec<f64> {
+    let x = &columns.position;
+    let mut doubt: Vec<f64> = resting.into_iter().map(|r| f64::from(u8::from(r))).collect();
+    for s in &columns.stretches {
+        for turn in crate::analysis::motion::turning_points(&x[s.clone()], 3.0 * resolution) {
+            let turn = s.start + turn;
+            let near = |i: usize| (x[i] - x[turn]).abs() < 2.5 * resolution;
+            let mut first = turn.saturating_sub(1).max(s.start);
+            while first > s.start && near(first - 1) {
+                first -= 1;
+            }
+            let mut last = (turn + 1).min(s.end - 1);
+            while last + 1 < s.end && near(last + 1) {
+                last += 1;
+            }
+            doubt[first..=last].fill(1.0);
+        }
+    }
+    doubt
+}
+
+/// Root mean square.
+fn typical(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+/// Rows away from the ends of their stretch, thinned to the filter's own density, that carry weight.
+fn judged_rows(columns: &Columns, margin: usize, stride: usize, carries: impl Fn(usize) -> bool) -> Vec<usize> {
     let mut kept = Vec::new();
     for s in &columns.stretches {
-        if s.len() < 4 * margin {
-            continue;
-        }
-        let mut bad_until = s.start + margin;
-        let mut next_bad = s.start;
-        for i in s.start..s.end - margin {
-            next_bad = next_bad.max(i);
-            while next_bad < s.end && next_bad <= i + margin && !resting[next_bad] {
-                next_bad += 1;
-            }
-            if next_bad <= i + margin && next_bad < s.end {
-                bad_until = bad_until.max(next_bad + margin + 1);
-            }
-            if i >= bad_until && (i - s.start) % stride == 0 {
-                kept.push(i);
-            }
+        if s.len() > 4 * margin {
+            kept.extend((s.start + margin..s.end - margin).step_by(stride).filter(|&row| carries(row)));
         }
     }
     let thin = kept.len().div_ceil(MOST_KEPT).max(1);

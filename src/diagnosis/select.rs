@@ -16,9 +16,9 @@ const BEAM: usize = 2;
 const TRIED: usize = 6;
 /// Most causes in a set.
 const MOST: usize = 6;
-/// Least gain of a cause in Σ ln(mean square): 4 % of what is left. A smaller one would not be worth a machinist's time,
+/// Least gain of a cause in Σ ln(mean square): 8 % of what is left. A smaller one would not be worth a machinist's time,
 /// and imperfect filters, grids and reversals make up to half of it on machines without any fault.
-pub const LEAST_GAIN: f64 = 0.04;
+pub const LEAST_GAIN: f64 = 0.08;
 /// What a further fitted number must gain where sets of causes compete.
 const NUMBER_PRICE: f64 = 0.003;
 
@@ -138,7 +138,8 @@ fn grow(bench: &Bench, set: &Fit, shelf: &Shelf) -> Vec<Fit> {
 
 fn may_join(set: &Fit, law: &Law) -> bool {
     let same = set.parts.iter().filter(|p| p.law.cause == law.cause).count();
-    same == 0 || law.cause.row().repeatable && same < 2
+    // Two tight spots side by side imitate anything along the stroke.
+    same == 0 || law.cause.row().repeatable && same < 2 && law.cause != Cause::PositionDependentFriction
 }
 
 fn is_physical(bench: &Bench, fit: &Fit) -> bool {

@@ -20,7 +20,7 @@ const LEAST_ROWS: usize = 300;
 /// Excess over the noise floor (in variance) below which a belief holds.
 const TOLERABLE_EXCESS: f64 = 0.6;
 /// Share of the excess that named causes must remove together.
-const LEAST_EXPLAINED: f64 = 0.6;
+const LEAST_EXPLAINED: f64 = 0.8;
 /// Excess (in variance) that may be left for everything to count as explained.
 const LITTLE_LEFT: f64 = 0.5;
 
@@ -201,10 +201,11 @@ impl Excess {
         self.channels.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Share of this excess that is gone in the other, of the channel that had most.
+    /// Share of this excess that is gone in the other, over the channels that had any.
     fn explained_by(&self, after: &Excess) -> f64 {
-        let worst = |a: f64, b: f64| if a > TOLERABLE_EXCESS { 1.0 - b.max(0.0) / a } else { 1.0 };
-        self.channels.iter().zip(&after.channels).map(|(a, b)| worst(*a, *b)).fold(1.0, f64::min)
+        let pairs = self.channels.iter().zip(&after.channels).filter(|(a, _)| **a > TOLERABLE_EXCESS);
+        let (before, left) = pairs.fold((0.0, 0.0), |(b, l), (x, y)| (b + x, l + y.max(0.0)));
+        if before > 0.0 { 1.0 - left / before } else { 1.0 }
     }
 }
 

@@ -49,10 +49,9 @@ pub fn term(frame: &Frame, effect: Effect, shares: Shares) -> Term {
             let link = contact(now - x, rate - v);
             extra[i] = link - b.constant - split.table_inertia * a - coulomb * frame.direction[i] - viscous * rate;
             twist_of[i] = (x - now) / frame.unit;
-            // Between rows the motor moves on the parabola through its neighbours.
+            // Both sides of the link at the same instant: half a step between them would be a false viscous force.
             for k in 0..steps {
-                let at = (k as f64 + 0.5) / steps as f64;
-                let m = now + at * (next - now);
+                let m = now + k as f64 / steps as f64 * (next - now);
                 let w = (next - now) / h;
                 let link = contact(m - x, w - v);
                 let free = v + dt * (link - b.constant - viscous * v) / split.table_inertia;
