@@ -85,6 +85,16 @@ pub fn cubic_at(values: &[f64], index: f64) -> f64 {
     b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
 }
 
+/// A regular series without what lies above a cut-off, unshifted: the band in which a [`Motion`] is known.
+#[must_use]
+pub fn smoothed(values: &[f64], period: f64, cutoff_hz: f64) -> Vec<f64> {
+    if values.len() < FEWEST_ROWS {
+        return values.to_vec();
+    }
+    let [smooth, _, _] = differentiate(values, period, cutoff_hz);
+    smooth
+}
+
 /// Smoothed series and its first two derivatives.
 fn differentiate(values: &[f64], period: f64, cutoff_hz: f64) -> [Vec<f64>; 3] {
     let n = values.len();

@@ -11,7 +11,7 @@
 
 use super::coupling::{longest_step_s, transmitted};
 use super::friction::Friction;
-use super::motion::cubic_at;
+use super::motion::{cubic_at, smoothed};
 use super::observed::Observed;
 use super::physics::{Physics, Ripple};
 use crate::machine::{Axis, Servo, TwoMasses};
@@ -89,12 +89,17 @@ fn needed_torque(physics: &Physics, observed: &Observed, run: Range<usize>, torq
         let (x, v, t) = (motion.position[i], motion.velocity[i], time[i] - time[0]);
         let dry = friction.moved((x - before) * scale, share * physics.friction_level(x, v, t));
         before = x;
-        let own = inertia * motion.acceleration[i] * scale + share * physics.slope_friction(v * scale) + dry;
-        torque[i] = own
-            + match &transmitted {
-                Some(table) => table[i - run.start],
-                None => physics.load(x, v, t),
-            };
+        let table = match &transmitted {
+            Some(table) => table[i - run.start],
+            None => physics.load(x, v, t),
+        };
+        torque[i] = share * physics.slope_friction(v * scale) + dry + table;
+    }
+    // Friction turns round and flanks meet in an instant, and the motor's acceleration answers it: the sum is smooth, but
+    // the acceleration is only known up to the cut-off. So all of it is taken up to there.
+    let known = smoothed(&torque[run.clone()], observed.period_s, motion.cutoff_hz);
+    for (i, known) in run.zip(known) {
+        torque[i] = known + inertia * motion.acceleration[i] * scale;
     }
 }
 
@@ -108,26 +113,23 @@ fn table_torque(physics: &Physics, masses: &TwoMasses, observed: &Observed, run:
     let (mut q, mut w) = at(run.start);
     // A table in motion is already pushed by its motor.
     q -= if w == 0.0 { 0.0 } else { (0.5 * masses.clearance).copysign(w) };
-    let mut out = Vec::with_capacity(run.len());
-    let wind_up = |i: usize, q: f64, w: f64| {
-        let (motor, speed) = at(i);
-        transmitted(masses, motor - q, speed - w)
-    };
-    out.push(wind_up(run.start, q, w));
+    // Mean of the torque between each row and the next.
+    let mut means = Vec::with_capacity(run.len());
     for i in run.start..run.end - 1 {
         let span = observed.time_s[i + 1] - observed.time_s[i];
         let steps = (span / longest_step_s(masses, masses.table_inertia)).ceil().clamp(1.0, 1000.0);
         let h = span / steps;
         let ((q0, w0), (q1, w1)) = (at(i), at(i + 1));
+        let mut sum = 0.0;
         for step in 0..steps as usize {
             let s = (step as f64 + 0.5) / steps;
             let (motor, speed) = hermite(q0, w0 * span, q1, w1 * span, s);
             let t = observed.time_s[i] - observed.time_s[0] + s * span;
             let middle = q + 0.5 * h * w;
             let (x, v) = (middle / scale, w / scale);
-            let push = transmitted(masses, motor - middle, speed / span - w)
-                - physics.load(x, v, t)
-                - share * physics.slope_friction(w);
+            let through = transmitted(masses, motor - middle, speed / span - w);
+            sum += through;
+            let push = through - physics.load(x, v, t) - share * physics.slope_friction(w);
             let next = friction.step(
                 masses.table_inertia,
                 masses.table_inertia * w + h * push,
@@ -138,9 +140,16 @@ fn table_torque(physics: &Physics, masses: &TwoMasses, observed: &Observed, run:
             q = middle + 0.5 * h * next;
             w = next;
         }
-        out.push(wind_up(i + 1, q, w));
+        means.push(sum / steps);
     }
-    out
+    // A row stands between the mean before it and the one after it.
+    let mean = |i: usize| means.get(i).copied();
+    (0..run.len())
+        .map(|i| match (i.checked_sub(1).and_then(mean), mean(i)) {
+            (Some(before), Some(after)) => 0.5 * (before + after),
+            (one, other) => one.or(other).unwrap_or(0.0),
+        })
+        .collect()
 }
 
 /// Value and slope (per unit of `s`) of the cubic through two points with two slopes.
