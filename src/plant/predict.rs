@@ -3,7 +3,8 @@
 //! Uses the motion of the whole recording (zero-phase) and never its torque, except for the phase of periodic terms,
 //! which is estimated from the first quarter of the rows. Dry friction at rest is not a function of the motion: it is
 //! carried over a standstill and turned round over a small travel, the one the machine says (pre-sliding) or the smallest
-//! that the position can tell.
+//! that the position can tell. Where clearance or spring stand between motor and table, the table's motion is that of its
+//! scale; without a scale the table is simulated behind the measured motor.
 //!
 //! Sampling: a servo that holds its command for a cycle and a motor that follows with time constant τ log, at the end of
 //! each cycle, a torque that is later than the smooth torque of the motion by Ts/(1 − e^(−Ts/τ)) − Ts/2 − τ. Without a
@@ -11,7 +12,7 @@
 
 use super::coupling::{longest_step_s, transmitted};
 use super::friction::Friction;
-use super::motion::{cubic_at, smoothed};
+use super::motion::{Motion, cubic_at, smoothed};
 use super::observed::Observed;
 use super::physics::{Physics, Ripple};
 use crate::machine::{Axis, Servo, TwoMasses};
@@ -76,7 +77,10 @@ fn needed_torque(physics: &Physics, observed: &Observed, run: Range<usize>, torq
     // Ten times what the position leaves open on the average: it leaves more open at a reversal. Never nothing.
     let smallest = (10.0 * motion.resolution * scale).max(1e-9 * scale);
     let travel = physics.presliding.unwrap_or(0.0).max(smallest);
-    let transmitted = physics.two_masses.map(|masses| table_torque(physics, &masses, observed, run.clone()));
+    let transmitted = physics.two_masses.map(|masses| {
+        measured_table_torque(physics, &masses, observed, run.clone())
+            .unwrap_or_else(|| table_torque(physics, &masses, observed, run.clone()))
+    });
     let (inertia, share) = match &physics.two_masses {
         Some(masses) => (masses.motor_inertia, 1.0 - masses.table_friction_share),
         None => (physics.inertia, 1.0),
@@ -101,6 +105,33 @@ fn needed_torque(physics: &Physics, observed: &Observed, run: Range<usize>, torq
     for (i, known) in run.zip(known) {
         torque[i] = known + inertia * motion.acceleration[i] * scale;
     }
+}
+
+/// Torque that the table takes, from its own scale; `None` where there is none, or not in every row.
+fn measured_table_torque(
+    physics: &Physics,
+    masses: &TwoMasses,
+    observed: &Observed,
+    run: Range<usize>,
+) -> Option<Vec<f64>> {
+    let table = observed.table_position.as_ref()?.get(run.clone())?;
+    if table.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
+    let motion = Motion::estimate(&observed.time_s[run.clone()], table)?;
+    let (scale, share) = (physics.motor_per_load, masses.table_friction_share);
+    let travel = physics.presliding.unwrap_or(0.0).max(10.0 * motion.resolution * scale).max(1e-9 * scale);
+    let level_at_rest = physics.friction_level(motion.position[0], 0.0, 0.0);
+    let mut friction = Friction { stiffness: share * level_at_rest / travel, force: 0.0 };
+    let mut before = motion.position[0];
+    let torque = |i: usize| {
+        let (x, v, t) = (motion.position[i], motion.velocity[i], observed.time_s[run.start + i] - observed.time_s[0]);
+        let dry = friction.moved((x - before) * scale, share * physics.friction_level(x, v, t));
+        before = x;
+        let inertia = masses.table_inertia * motion.acceleration[i] * scale;
+        inertia + share * physics.slope_friction(v * scale) + dry + physics.load(x, v, t)
+    };
+    Some((0..table.len()).map(torque).collect())
 }
 
 /// Torque that the table takes from a motor that moves as measured: the table is simulated behind its spring or clearance.
