@@ -106,7 +106,7 @@ fn what_is_simulated_is_predicted_in_the_format_s_columns() {
         lines.next().unwrap(),
         "time_s,x.force_n,x.predicted_force_n,x.residual_force_n,x.position_mm,x.predicted_position_mm"
     );
-    let (mut rows, mut square) = (0, 0.0);
+    let (mut rows, mut square) = (0_usize, 0.0);
     for (line, recorded) in lines.zip(recording.lines().skip(1)) {
         let row: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
         let recorded: Vec<f64> = recorded.split(',').map(|cell| cell.parse().unwrap()).collect();
@@ -116,7 +116,7 @@ fn what_is_simulated_is_predicted_in_the_format_s_columns() {
         rows += 1;
     }
     assert_eq!(rows, recording.lines().count() - 1);
-    let rms = (square / f64::from(rows)).sqrt();
+    let rms = (square / rows as f64).sqrt();
     println!("residual {rms} N");
     assert!(rms > 0.09, "less than the noise");
 }

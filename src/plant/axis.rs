@@ -8,24 +8,32 @@
 use super::coupling::transmitted;
 use super::friction::Friction;
 use super::physics::Physics;
+use crate::machine::TwoMasses;
 
-/// State of an axis in the motor's coordinate.
+/// An axis's body, in the motor's coordinate.
 #[derive(Debug, Clone)]
 pub struct Body {
     physics: Physics,
     /// Plant step, s.
     step_s: f64,
-    /// Time since the start, s.
-    time_s: f64,
     load_per_motor: f64,
     /// Rest and mean over a step of a first-order lag.
     lag: (f64, f64),
     plain: bool,
     viscous: f64,
+    state: State,
+}
+
+/// What changes from step to step; copied out of the body while it runs, so that it can stay in registers.
+#[derive(Debug, Clone, Copy)]
+struct State {
+    /// Time since the start, s.
+    time_s: f64,
     /// What the motor's current says.
     torque: f64,
     motor: Mass,
-    table: Option<Mass>,
+    /// Follows nothing on a rigid axis.
+    table: Mass,
 }
 
 /// One mass and its share of friction.
@@ -39,12 +47,19 @@ struct Mass {
 }
 
 impl Mass {
-    /// Kick by `torque`, implicit in friction; returns the new speed.
-    #[inline]
-    fn kick(&mut self, h: f64, torque: f64, viscous: f64, level: f64) -> f64 {
+    /// Kick by `torque` at the middle of a step, implicit in friction, then the second half of the drift.
+    #[inline(always)]
+    fn kick(&mut self, h: f64, middle: f64, torque: f64, viscous: f64, level: f64) {
         let half = 0.5 * h * self.share * viscous;
         let impulse = (self.inertia - half) * self.velocity + h * torque;
-        self.friction.step(self.inertia + half, impulse, h, self.velocity, self.share * level)
+        self.velocity = self.friction.step(self.inertia + half, impulse, h, self.velocity, self.share * level);
+        self.position = middle + 0.5 * h * self.velocity;
+    }
+
+    /// Position after the first half of the drift.
+    #[inline(always)]
+    fn middle(&self, h: f64) -> f64 {
+        self.position + 0.5 * h * self.velocity
     }
 }
 
@@ -61,7 +76,7 @@ impl Body {
             friction: Friction { stiffness: share * stiffness, force: 0.0 },
         };
         let (motor, table) = match &physics.two_masses {
-            None => (mass(physics.inertia, 1.0), None),
+            None => (mass(physics.inertia, 1.0), mass(physics.inertia, 0.0)),
             Some(masses) => {
                 let share = masses.table_friction_share;
                 let mut table = mass(masses.table_inertia, share);
@@ -69,7 +84,7 @@ impl Body {
                 if velocity != 0.0 {
                     table.position -= (0.5 * masses.clearance).copysign(velocity);
                 }
-                (mass(masses.motor_inertia, 1.0 - share), Some(table))
+                (mass(masses.motor_inertia, 1.0 - share), table)
             }
         };
         let lag = if time_constant_s > 0.0 {
@@ -80,100 +95,90 @@ impl Body {
         };
         let plain = physics.is_plain();
         let load_per_motor = 1.0 / physics.motor_per_load;
-        let viscous = physics.slope_friction(1.0);
-        Body { physics, step_s, time_s: 0.0, load_per_motor, lag, plain, viscous, torque, motor, table }
+        let viscous = physics.slope_at(1.0);
+        let state = State { time_s: 0.0, torque, motor, table };
+        Body { physics, step_s, load_per_motor, lag, plain, viscous, state }
     }
 
     /// Advances by `steps` plant steps while the servo asks for `asked`.
     pub fn advance(&mut self, asked: f64, steps: usize) {
-        match (self.plain, self.table.is_some()) {
-            (true, false) => (0..steps).for_each(|_| self.rigid_step::<true>(asked)),
-            (false, false) => (0..steps).for_each(|_| self.rigid_step::<false>(asked)),
-            (true, true) => (0..steps).for_each(|_| self.two_mass_step::<true>(asked)),
-            (false, true) => (0..steps).for_each(|_| self.two_mass_step::<false>(asked)),
+        let mut state = self.state;
+        match (&self.physics.two_masses, self.plain) {
+            (None, true) => (0..steps).for_each(|_| self.rigid_step::<true>(&mut state, asked)),
+            (None, false) => (0..steps).for_each(|_| self.rigid_step::<false>(&mut state, asked)),
+            (Some(masses), true) => (0..steps).for_each(|_| self.two_mass_step::<true>(masses, &mut state, asked)),
+            (Some(masses), false) => (0..steps).for_each(|_| self.two_mass_step::<false>(masses, &mut state, asked)),
         }
+        self.state = state;
     }
 
-    #[inline]
-    fn motor_torque(&mut self, asked: f64) -> f64 {
-        let excess = self.torque - asked;
-        self.torque = asked + excess * self.lag.0;
+    /// Mean torque of the motor over a step.
+    #[inline(always)]
+    fn motor_torque(&self, state: &mut State, asked: f64) -> f64 {
+        let excess = state.torque - asked;
+        state.torque = asked + excess * self.lag.0;
         asked + excess * self.lag.1
     }
 
-    #[inline]
-    fn rigid_step<const PLAIN: bool>(&mut self, asked: f64) {
-        let h = self.step_s;
-        let mut torque = self.motor_torque(asked);
-        let p = &self.physics;
-        let m = &mut self.motor;
-        let middle = m.position + 0.5 * h * m.velocity;
-        let (level, viscous) = if PLAIN {
-            torque -= p.constant_torque();
-            (p.coulomb(), self.viscous)
+    #[inline(always)]
+    fn rigid_step<const PLAIN: bool>(&self, state: &mut State, asked: f64) {
+        let (h, p) = (self.step_s, &self.physics);
+        let torque = self.motor_torque(state, asked);
+        let m = &mut state.motor;
+        let middle = m.middle(h);
+        if PLAIN {
+            m.kick(h, middle, torque - p.constant_torque(), self.viscous, p.coulomb());
         } else {
-            let (x, v) = (middle * self.load_per_motor, m.velocity * self.load_per_motor);
-            torque = p.delivered(torque) - p.load(x, v, self.time_s) - p.cogging_torque(x);
-            (p.friction_level(x, v, self.time_s), p.slope_at(m.velocity))
-        };
-        let next = m.kick(h, torque, viscous, level);
-        m.position = middle + 0.5 * h * next;
-        m.velocity = next;
-        self.time_s += h;
+            let (x, v, t) = (middle * self.load_per_motor, m.velocity * self.load_per_motor, state.time_s);
+            let torque = p.delivered(torque) - p.load(x, v, t) - p.cogging_torque(x);
+            m.kick(h, middle, torque, p.slope_at(m.velocity), p.friction_level(x, v, t));
+        }
+        state.time_s += h;
     }
 
-    #[inline]
-    fn two_mass_step<const PLAIN: bool>(&mut self, asked: f64) {
-        let h = self.step_s;
-        let mut torque = self.motor_torque(asked);
-        let p = &self.physics;
-        let (Some(table), Some(masses)) = (&mut self.table, &p.two_masses) else { return };
-        let m = &mut self.motor;
-        let motor_middle = m.position + 0.5 * h * m.velocity;
-        let table_middle = table.position + 0.5 * h * table.velocity;
-        let push = transmitted(masses, motor_middle - table_middle, m.velocity - table.velocity);
-        let (motor_next, table_next) = if PLAIN {
+    #[inline(always)]
+    fn two_mass_step<const PLAIN: bool>(&self, masses: &TwoMasses, state: &mut State, asked: f64) {
+        let (h, p) = (self.step_s, &self.physics);
+        let torque = self.motor_torque(state, asked);
+        let (motor, table) = (&mut state.motor, &mut state.table);
+        let (motor_middle, table_middle) = (motor.middle(h), table.middle(h));
+        let push = transmitted(masses, motor_middle - table_middle, motor.velocity - table.velocity);
+        if PLAIN {
             let level = p.coulomb();
-            let load = p.constant_torque();
-            (m.kick(h, torque - push, self.viscous, level), table.kick(h, push - load, self.viscous, level))
+            motor.kick(h, motor_middle, torque - push, self.viscous, level);
+            table.kick(h, table_middle, push - p.constant_torque(), self.viscous, level);
         } else {
-            let t = self.time_s;
-            let (x, v) = (motor_middle * self.load_per_motor, m.velocity * self.load_per_motor);
-            torque = p.delivered(torque) - p.cogging_torque(x);
-            let motor_next = m.kick(h, torque - push, p.slope_at(m.velocity), p.friction_level(x, v, t));
+            let t = state.time_s;
+            let (x, v) = (motor_middle * self.load_per_motor, motor.velocity * self.load_per_motor);
+            let torque = p.delivered(torque) - p.cogging_torque(x);
+            motor.kick(h, motor_middle, torque - push, p.slope_at(motor.velocity), p.friction_level(x, v, t));
             let (x, v) = (table_middle * self.load_per_motor, table.velocity * self.load_per_motor);
-            let load = p.load(x, v, t);
-            let level = p.friction_level(x, v, t);
-            (motor_next, table.kick(h, push - load, p.slope_at(table.velocity), level))
-        };
-        m.position = motor_middle + 0.5 * h * motor_next;
-        m.velocity = motor_next;
-        table.position = table_middle + 0.5 * h * table_next;
-        table.velocity = table_next;
-        self.time_s += h;
+            table.kick(h, table_middle, push - p.load(x, v, t), p.slope_at(table.velocity), p.friction_level(x, v, t));
+        }
+        state.time_s += h;
     }
 
     /// Motor position, motor's coordinate.
     #[must_use]
     pub fn motor_position(&self) -> f64 {
-        self.motor.position
+        self.state.motor.position
     }
 
     /// Table position before any error of the screw, in the motor's coordinate.
     #[must_use]
     pub fn table_position(&self) -> f64 {
-        self.table.as_ref().unwrap_or(&self.motor).position
+        if self.physics.two_masses.is_some() { self.state.table.position } else { self.state.motor.position }
     }
 
     /// Motor speed, motor's coordinate per second.
     #[must_use]
     pub fn motor_velocity(&self) -> f64 {
-        self.motor.velocity
+        self.state.motor.velocity
     }
 
     /// What the motor's current says, drive's own unit.
     #[must_use]
     pub fn torque(&self) -> f64 {
-        self.torque
+        self.state.torque
     }
 }

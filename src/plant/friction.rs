@@ -19,12 +19,15 @@ impl Friction {
     /// Speed after a step of `h` seconds, from the speed `v` before it.
     ///
     /// `mass`·v′ = `impulse` − h·F with |F| up to `level`; mass and impulse hold all else that acts.
-    #[inline]
+    #[inline(always)]
     pub fn step(&mut self, mass: f64, impulse: f64, h: f64, v: f64, level: f64) -> f64 {
-        if self.stiffness == 0.0 || level <= 0.0 {
+        if self.stiffness == 0.0 {
             let left = (impulse.abs() - h * level).max(0.0);
-            self.force = 0.0;
             return left.copysign(impulse) / mass;
+        }
+        if level <= 0.0 {
+            self.force = 0.0;
+            return impulse / mass;
         }
         // F′ = (F + σ·h·v′)·L/d, with the bristle slipping at the speed before the step.
         let d = level + self.stiffness * h * v.abs();

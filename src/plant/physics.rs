@@ -140,8 +140,11 @@ impl Physics {
     pub fn friction_level(&self, x: f64, v: f64, t: f64) -> f64 {
         let mut level = self.coulomb;
         if let Some((torque, per_velocity)) = self.stribeck {
-            let ratio = v * per_velocity;
-            level += torque * (-ratio * ratio).exp();
+            let square = (v * per_velocity) * (v * per_velocity);
+            // Beyond this the exponential is less than a rounding of the sum, and it is dear.
+            if square < 40.0 {
+                level += torque * (-square).exp();
+            }
         }
         for spot in &self.spots {
             let distance = (x - spot.centre) * spot.per_width;

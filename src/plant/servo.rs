@@ -92,8 +92,9 @@ mod tests {
 
     #[test]
     fn it_takes_over_a_moving_axis_without_a_jump() {
-        let speed = 3.0;
-        let mut servo = ServoLoop::new(SERVO, 100.0, 1.0, speed, 0.7);
-        assert!((servo.cycle(1.0, 0.0, 1.0) - 0.7).abs() < 1e-9);
+        // On the command at 3 /s, the command at the same speed: the torque it holds goes on.
+        let mut servo = ServoLoop::new(SERVO, 100.0, 1.0, 3.0, 0.7);
+        assert!((servo.cycle(1.0, 3.0, 1.0) - 0.7).abs() < 1e-9);
+        assert!((servo.cycle(1.003, 3.0, 1.003) - 0.7).abs() < 1e-9);
     }
 }
