@@ -82,6 +82,25 @@ fn a_decimal_comma_country_reads_and_writes_a_point() {
     assert!(german("get").1.starts_with("INA = 0.5 kg·m²"));
 }
 
+/// LinuxCNC's own interpreter hands the values on to the analogue outputs 0 and 1.
+#[test]
+fn linuxcnc_takes_what_is_written() {
+    let (folder, _) = lay_down(PROGRAM);
+    let path = folder.path().join("shaft.ngc");
+    fs::write(&path, "%\n(SHAFT)\nM68 E0 Q#<_ina>\nM68 E1 Q#<_ina2>\nM2\n%\n").unwrap();
+    program::set(&path, Scope::Program, 0.5, None).unwrap();
+    program::set(&path, Scope::Step(2), 0.42, None).unwrap();
+    let Ok(output) = Command::new("rs274").arg("-g").arg(&path).current_dir(folder.path()).output() else {
+        eprintln!("skipped: no rs274 here (package linuxcnc-uspace)");
+        return;
+    };
+    let (_, text, _) = said(&output);
+    assert!(
+        text.contains("SET_AUX_OUTPUT_VALUE(0,0.500000)") && text.contains("SET_AUX_OUTPUT_VALUE(1,0.420000)"),
+        "{text}"
+    );
+}
+
 #[test]
 fn nothing_to_change_leaves_even_the_file_as_it_is() {
     let (_folder, path) = lay_down(PROGRAM);
