@@ -1,9 +1,11 @@
 //! Lost motion of an axis from a recording.
 //!
 //! What a reversal loses is the change of (motor − table) between steady slow motion one way and the other. With a scale on
-//! the table it is read off directly ([`from_positions`]).
+//! the table it is read off directly ([`from_positions`]); without one it is estimated from
+//! the motor's torque ([`from_torque`]).
 
 pub mod from_positions;
+pub mod from_torque;
 mod pair;
 mod sweeps;
 mod time_skew;
@@ -41,6 +43,8 @@ pub enum Refusal {
         /// Of these, in how many the table does not follow the motor.
         still: usize,
     },
+    /// It turns round, but at no reversal does the torque show a release and a wind-up: why, for each.
+    NoCurve(Vec<String>),
 }
 
 impl fmt::Display for Refusal {
@@ -58,6 +62,17 @@ impl fmt::Display for Refusal {
                  too short for the table to move steadily, and in {still} the table does not follow the motor; move further \
                  (ten times the lost motion at least) and slower"
             ),
+            Refusal::NoCurve(why) => {
+                let shown: Vec<&str> = why.iter().take(3).map(String::as_str).collect();
+                write!(
+                    f,
+                    "no torque curve: at none of {} reversals does the torque show a release and a wind-up ({}{}); slide slowly \
+                     one way, reverse without a pause, and slide on until the torque is steady",
+                    why.len(),
+                    shown.join("; "),
+                    if why.len() > 3 { "; …" } else { "" }
+                )
+            }
         }
     }
 }

@@ -47,14 +47,20 @@ impl Track {
     pub fn sweeps(&self) -> Vec<Sweep> {
         let (low, high) =
             self.motor.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
-        let travel = smallest_travel(&self.motor).max(5e-4 * (high - low));
-        if high - low <= travel {
-            return Vec::new();
-        }
+        self.cut(smallest_travel(&self.motor).max(5e-4 * (high - low)))
+    }
+
+    /// Cuts the track at every turn that noise and grid do not make by themselves.
+    pub fn fine_sweeps(&self) -> Vec<Sweep> {
+        self.cut(smallest_travel(&self.motor))
+    }
+
+    fn cut(&self, travel: f64) -> Vec<Sweep> {
         let mut cuts = vec![0];
         cuts.extend(turning_points(&self.motor, travel));
         cuts.push(self.motor.len() - 1);
-        cuts.windows(2).enumerate().map(|(i, ends)| self.sweep(ends[0]..ends[1] + 1, i == 0)).collect()
+        let whole = |ends: &&[usize]| (self.motor[ends[1]] - self.motor[ends[0]]).abs() > travel;
+        cuts.windows(2).filter(whole).enumerate().map(|(i, ends)| self.sweep(ends[0]..ends[1] + 1, i == 0)).collect()
     }
 
     fn sweep(&self, rows: Range<usize>, first: bool) -> Sweep {
@@ -103,6 +109,11 @@ impl Track {
 }
 
 impl Sweep {
+    /// Distance from the first moving row to the last.
+    pub fn way(&self) -> f64 {
+        self.moving.first().zip(self.moving.last()).map_or(0.0, |(a, b)| (b.motor - a.motor).abs())
+    }
+
     /// The moving rows from `travel` after the first on.
     pub fn after(&self, travel: f64) -> &[Sample] {
         let Some(first) = self.moving.first() else { return &[] };

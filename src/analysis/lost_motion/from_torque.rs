@@ -1,0 +1,436 @@
+//! Lost motion estimated from motor torque, where no scale on the table says it. It is not the reversal value of ISO 230-2.
+//!
+//! At each slow reversal the torque falls as the wind-up is released, stays level across the clearance, and rises as the
+//! drive winds up the other way, until the table slides again:
+//! `lost motion = clearance + 2·Ts/k` (see [`crate::cycle::backlash::fit`], which does the fit here as in the control). This
+//! file finds the reversals in a recording, the sliding torque before and after each, and the torque against travel between.
+//!
+//! Friction on the motor's side turns its sign at the reversal but winds nothing up. It shows in two ways: as the level across
+//! the clearance, and where the recording goes a few µm back and forth while the table sticks. Where neither is there, it is
+//! taken as 20 ± 20 % of the friction, and the uncertainty says so.
+
+use super::sweeps::{Sample, Sweep, Track};
+use super::{Refusal, Value};
+use crate::analysis::statistics::{Mean, correlated_mean, grid, quantile, student_95};
+use crate::cycle::backlash::curve::Curve;
+use crate::cycle::backlash::fit::{Fit, Fitted, Levels};
+use crate::cycle::backlash::verdict::check_reversal;
+use crate::error::status_text;
+use crate::recording::{Recording, RecordingError, Signal, Unit, file_row};
+
+/// How friction on the motor's side was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MotorFriction {
+    /// From going back and forth while the table sticks.
+    Probe,
+    /// From the level across the clearance.
+    Clearance,
+    /// Not seen: 20 ± 20 % of the friction is taken.
+    Assumed,
+}
+
+/// What the torque curve of one reversal gives. Lengths in mm or degrees, efforts in N·m or N.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Lost motion between steady slow motion one way and the other.
+    pub lost_motion: Value,
+    /// Part of it that is clearance.
+    pub clearance: f64,
+    /// Part of it that is elastic wind-up.
+    pub windup: f64,
+    /// Stiffness of the drive at the motor, effort per mm or degree.
+    pub stiffness: f64,
+    /// Sliding friction, half the change of effort at the reversal.
+    pub sliding: f64,
+    /// Part of it on the motor's side.
+    pub motor_friction: f64,
+}
+
+/// One reversal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reversal {
+    /// Row of the file in which the motor turns round (1 is the header).
+    pub row: usize,
+    /// Time of that row, s.
+    pub time_s: f64,
+    /// Motor position there.
+    pub position: f64,
+    /// Direction after the reversal: +1 or −1.
+    pub direction: i8,
+    /// What was found, or why nothing was.
+    pub result: Result<Estimate, String>,
+    /// Effort, positive in the new direction, against travel since the reversal.
+    pub curve: Vec<(f64, f64)>,
+}
+
+/// The result for one axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TorqueLostMotion {
+    /// The axis.
+    pub channel: String,
+    /// `mm` or `deg`.
+    pub unit: &'static str,
+    /// `nm` or `n`.
+    pub effort_unit: &'static str,
+    /// Mean of the reversals, each sense counted alike.
+    pub mean: Estimate,
+    /// Standard deviation from reversal to reversal; `None` with fewer than two.
+    pub spread: Option<f64>,
+    /// How friction on the motor's side was found.
+    pub motor_friction: MotorFriction,
+    /// False when the uncertainty is more than a third of the value: no compensation should be written from it.
+    pub trustworthy: bool,
+    /// Every reversal of the recording.
+    pub reversals: Vec<Reversal>,
+}
+
+/// Estimates the lost motion of `channel` from position and torque (or force).
+///
+/// # Errors
+/// A missing column, no reversal, or none whose curve can be fitted.
+pub fn estimate(recording: &Recording, channel: &str) -> Result<TorqueLostMotion, Refusal> {
+    let (pieces, unit, effort_unit) = pieces(recording, channel)?;
+    let mut turns: Vec<Turn> = pieces.iter().flat_map(Piece::turns).collect();
+    if turns.is_empty() {
+        return Err(Refusal::NoReversal);
+    }
+    let first: Vec<Fitted> = turns.iter().filter_map(|turn| turn.fit(0.0, 0.0).ok()).collect();
+    let lost: Vec<f64> = first.iter().map(|fitted| fitted.lost_motion).collect();
+    let Some(about) = quantile(&lost, 0.5) else {
+        return Err(Refusal::NoCurve(turns.iter().map(Turn::why).collect()));
+    };
+    let (friction, source) = motor_friction(&pieces, &turns, about);
+    turns.iter_mut().for_each(|turn| turn.finish(&friction));
+    let resolution = pieces.iter().map(|piece| piece.resolution).fold(0.0, f64::max);
+    let mean =
+        joined(&turns, &friction, resolution).ok_or_else(|| Refusal::NoCurve(turns.iter().map(Turn::why).collect()))?;
+    let values: Vec<f64> = turns.iter().filter_map(|t| t.result.as_ref().ok()).map(|e| e.lost_motion.value).collect();
+    Ok(TorqueLostMotion {
+        channel: channel.to_owned(),
+        unit: unit.suffix(),
+        effort_unit: effort_unit.suffix(),
+        mean,
+        spread: (values.len() > 1).then(|| deviation(&values)),
+        motor_friction: source,
+        trustworthy: mean.lost_motion.uncertainty < 0.33 * mean.lost_motion.value,
+        reversals: turns.into_iter().map(Turn::report).collect(),
+    })
+}
+
+/// An unbroken piece of the recording, with the effort in the place of the difference.
+struct Piece {
+    track: Track,
+    sweeps: Vec<Sweep>,
+    rows: Vec<usize>,
+    resolution: f64,
+}
+
+fn pieces(recording: &Recording, channel: &str) -> Result<(Vec<Piece>, Unit, Unit), Refusal> {
+    let position = recording.column(channel, Signal::Position)?;
+    let effort = match recording.get(channel, Signal::Force) {
+        Some(force) => force,
+        None => recording.column(channel, Signal::Torque)?,
+    };
+    let foreign = || Refusal::Recording(RecordingError::new(&recording.file, "holds a column without a unit"));
+    let (positions, unit) = position.in_house().ok_or_else(foreign)?;
+    let (efforts, effort_unit) = effort.in_house().ok_or_else(foreign)?;
+    let rows = recording.pieces(&[position, effort], recording.sampling.gap_s);
+    let piece = |rows: Vec<usize>| {
+        let take = |values: &[f64]| -> Vec<f64> { rows.iter().map(|row| values[*row]).collect() };
+        let motor = take(&positions);
+        let resolution = grid(&motor).unwrap_or(0.0);
+        let track = Track { time_s: take(&recording.time_s), motor, difference: take(&efforts) };
+        Piece { sweeps: track.fine_sweeps(), track, rows, resolution }
+    };
+    Ok((rows.into_iter().map(piece).collect(), unit, effort_unit))
+}
+
+/// A reversal with what its fit needs.
+struct Turn {
+    row: usize,
+    time_s: f64,
+    position: f64,
+    direction: f64,
+    /// Travel since the reversal and effort in the new sense, in order of time.
+    samples: Vec<(f64, f64)>,
+    levels: Result<(Mean, Mean), String>,
+    /// The shorter of the ways before and after.
+    way: f64,
+    resolution: f64,
+    result: Result<Estimate, String>,
+}
+
+impl Piece {
+    fn turns(&self) -> Vec<Turn> {
+        (1..self.sweeps.len()).map(|i| self.turn(i)).collect()
+    }
+
+    fn turn(&self, i: usize) -> Turn {
+        let (before, after) = (&self.sweeps[i - 1], &self.sweeps[i]);
+        let (row, direction) = (after.rows.start, after.direction);
+        let position = self.track.motor[row];
+        let samples = after
+            .rows
+            .clone()
+            .map(|row| (direction * (self.track.motor[row] - position), direction * self.track.difference[row]))
+            .collect();
+        // A scan that ends soon after the table slides holds too little sliding of its own; the sweep before last went the
+        // same way.
+        let own = sliding(after, direction);
+        let earlier = i.checked_sub(2).and_then(|i| sliding(&self.sweeps[i], direction));
+        let after_level = match (own, earlier) {
+            (Some(own), Some(earlier)) if earlier.error < own.error && similar(&own, &earlier) => Some(earlier),
+            (None, earlier) => earlier,
+            (own, _) => own,
+        };
+        let levels = match (sliding(before, direction), after_level) {
+            (Some(before), Some(after)) => Ok((before, after)),
+            (None, _) => Err("the axis does not slide steadily before it".to_owned()),
+            (_, None) => Err("the axis does not slide steadily after it".to_owned()),
+        };
+        Turn {
+            row: file_row(self.rows[row]),
+            time_s: self.track.time_s[row],
+            position,
+            direction,
+            samples,
+            levels,
+            way: before.way().min(after.way()),
+            resolution: self.resolution,
+            result: Err(String::new()),
+        }
+    }
+}
+
+fn similar(a: &Mean, b: &Mean) -> bool {
+    (a.value - b.value).abs() < 4.0 * a.error.hypot(b.error) + 0.1 * a.value.abs()
+}
+
+/// The effort of steady sliding in a sweep, in the sense of `direction`: over the last third of the way, at one speed. `None`
+/// where the sweep is too short to tell.
+fn sliding(sweep: &Sweep, direction: f64) -> Option<Mean> {
+    const FEWEST_ROWS: usize = 20;
+    let (first, last) = (sweep.moving.first()?, sweep.moving.last()?);
+    let way = (last.motor - first.motor).abs();
+    let late: Vec<&Sample> = sweep.moving.iter().filter(|s| (s.motor - first.motor).abs() > 0.667 * way).collect();
+    let speeds: Vec<f64> = late.iter().map(|s| s.speed.abs()).collect();
+    let usual = quantile(&speeds, 0.5)?;
+    let steady: Vec<f64> =
+        late.iter().filter(|s| (s.speed.abs() - usual).abs() < 0.2 * usual).map(|s| direction * s.difference).collect();
+    if steady.len() < FEWEST_ROWS { None } else { correlated_mean(&steady) }
+}
+
+/// Friction on the motor's side, and its standard error; with no evidence a share of the sliding friction.
+struct Friction {
+    value: Option<(f64, f64)>,
+}
+
+impl Friction {
+    /// For a reversal whose effort changes by `change`.
+    fn at(&self, change: f64) -> (f64, f64) {
+        // Even over 0 to 40 % of half the change.
+        self.value.unwrap_or((0.1 * change, 0.2 * change / 12f64.sqrt()))
+    }
+}
+
+/// The fewest bins that the clearance must span for its level to show the motor's friction.
+const CLEARANCE_SHARE: f64 = 0.15;
+
+fn motor_friction(pieces: &[Piece], turns: &[Turn], about: f64) -> (Friction, MotorFriction) {
+    let probes: Vec<f64> = pieces.iter().flat_map(|piece| probes(piece, about)).collect();
+    if let Some(found) = mean_of(&probes) {
+        return (Friction { value: Some(found) }, MotorFriction::Probe);
+    }
+    let level = |turn: &Turn| {
+        let fitted = turn.fit(0.0, 0.0).ok()?;
+        let (before, after) = turn.levels.as_ref().ok()?;
+        let wide = fitted.clearance > CLEARANCE_SHARE * fitted.lost_motion && fitted.clearance > 4.0 * turn.width();
+        wide.then(|| (fitted.level - 0.5 * (before.value + after.value)).max(0.0))
+    };
+    let levels: Vec<f64> = turns.iter().filter_map(level).collect();
+    match mean_of(&levels) {
+        Some(found) => (Friction { value: Some(found) }, MotorFriction::Clearance),
+        None => (Friction { value: None }, MotorFriction::Assumed),
+    }
+}
+
+/// Mean and its standard error; `None` for fewer than two values.
+fn mean_of(values: &[f64]) -> Option<(f64, f64)> {
+    let n = values.len() as f64;
+    (values.len() > 1).then(|| (values.iter().sum::<f64>() / n, deviation(values) / n.sqrt()))
+}
+
+/// The motor's friction from each short way back and forth: half the distance of two parallel lines of effort over position.
+fn probes(piece: &Piece, about: f64) -> Vec<f64> {
+    const FEWEST_ROWS: usize = 10;
+    let one = |ends: &[Sweep]| {
+        let short = 0.6 * about;
+        if ends[0].way() > short {
+            return None;
+        }
+        let back: Vec<&Sample> = ends[0].moving.iter().collect();
+        let (low, high) =
+            back.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(s.motor), h.max(s.motor)));
+        let edge = 0.25 * (high - low);
+        let inside = |s: &&Sample| s.motor > low + edge && s.motor < high - edge;
+        let back: Vec<&Sample> = back.into_iter().filter(inside).collect();
+        let forth: Vec<&Sample> = ends[1].moving.iter().filter(inside).collect();
+        if back.len() < FEWEST_ROWS || forth.len() < FEWEST_ROWS {
+            return None;
+        }
+        Some(0.5 * ends[1].direction * apart(&back, &forth)).filter(|friction| *friction >= 0.0)
+    };
+    piece.sweeps.windows(2).filter_map(one).collect()
+}
+
+/// How far the second line lies above the first, both with one slope.
+fn apart(first: &[&Sample], second: &[&Sample]) -> f64 {
+    let mean = |of: &[&Sample], value: fn(&Sample) -> f64| of.iter().map(|s| value(s)).sum::<f64>() / of.len() as f64;
+    let centre = |of: &[&Sample]| (mean(of, |s| s.motor), mean(of, |s| s.difference));
+    let (a, b) = (centre(first), centre(second));
+    let sums = |of: &[&Sample], (x, y): (f64, f64)| {
+        of.iter().fold((0.0, 0.0), |(xx, xy), s| (xx + (s.motor - x).powi(2), xy + (s.motor - x) * (s.difference - y)))
+    };
+    let ((xx, xy), (uu, uv)) = (sums(first, a), sums(second, b));
+    let slope = (xy + uv) / (xx + uu).max(f64::MIN_POSITIVE);
+    b.1 - a.1 - slope * (b.0 - a.0)
+}
+
+/// Bins over the way to sliding.
+const BINS: f64 = 200.0;
+
+impl Turn {
+    /// Travel at which the effort has first come near the sliding level after the reversal.
+    fn rise(&self) -> Option<f64> {
+        const NEAR: f64 = 0.9;
+        let (before, after) = self.levels.as_ref().ok()?;
+        let goal = before.value + (0.5 + 0.5 * NEAR) * (after.value - before.value);
+        // Sixteen rows calm the noise; the delay they bring only lengthens the curve a little.
+        let mut smooth = before.value;
+        self.samples.iter().find_map(|(travel, effort)| {
+            smooth += (effort - smooth) / 16.0;
+            (smooth > goal).then_some(*travel)
+        })
+    }
+
+    fn width(&self) -> f64 {
+        (1.5 * self.rise().unwrap_or(0.0) / BINS).max(self.resolution)
+    }
+
+    fn fit(&self, motor: f64, motor_error: f64) -> Result<Fitted, String> {
+        let (before, after) = self.levels.as_ref().map_err(Clone::clone)?;
+        let change = after.value - before.value;
+        if change <= 5.0 * before.error.hypot(after.error) {
+            return Err("the effort does not change at it by more than its noise".into());
+        }
+        let Some(rise) = self.rise().filter(|rise| *rise > 0.0) else {
+            return Err("the effort does not rise to the sliding level after it".into());
+        };
+        let mut curve = Box::new(Curve::default());
+        curve.start(self.width());
+        for (travel, effort) in self.samples.iter().filter(|(travel, _)| *travel < 1.5 * rise) {
+            curve.add(*travel, *effort);
+        }
+        let variance = before.error.powi(2) + after.error.powi(2) + (2.0 * motor_error).powi(2);
+        let mut fit = Box::new(Fit::default());
+        fit.start(Levels { before: before.value, after: after.value, motor, variance });
+        for _ in 0..=Fit::slices_bound() {
+            if fit.advance(&curve) {
+                break;
+            }
+        }
+        let fitted =
+            check_reversal(fit.result()).map_err(|fault| status_text(fault.code).trim_end_matches('\0').to_owned())?;
+        if self.way < 1.5 * fitted.lost_motion {
+            return Err("the way before or after it is too short for the table to slide".into());
+        }
+        Ok(fitted)
+    }
+
+    fn finish(&mut self, friction: &Friction) {
+        let change = self.levels.as_ref().map_or(0.0, |(before, after)| after.value - before.value);
+        let (motor, error) = friction.at(change);
+        self.result = self.fit(motor, error).map(|fitted| Estimate {
+            lost_motion: Value { value: fitted.lost_motion, uncertainty: 2.0 * fitted.variance.sqrt() },
+            clearance: fitted.clearance,
+            windup: fitted.windup,
+            stiffness: fitted.stiffness,
+            sliding: 0.5 * change,
+            motor_friction: motor,
+        });
+    }
+
+    fn why(&self) -> String {
+        let why = self.result.as_ref().err().filter(|why| !why.is_empty()).cloned();
+        let why = why.or_else(|| self.fit(0.0, 0.0).err()).unwrap_or_default();
+        format!("row {}: {why}", self.row)
+    }
+
+    fn report(self) -> Reversal {
+        let width = self.width().max(f64::MIN_POSITIVE);
+        let end = 2.0 * self.rise().unwrap_or(0.0);
+        let mut curve: Vec<(f64, f64, f64)> = Vec::new();
+        for (travel, effort) in self.samples.iter().filter(|(travel, _)| *travel >= 0.0 && *travel < end) {
+            let bin = (travel / width) as usize;
+            if curve.len() <= bin {
+                curve.resize(bin + 1, (0.0, 0.0, 0.0));
+            }
+            let sums = &mut curve[bin];
+            *sums = (sums.0 + 1.0, sums.1 + travel, sums.2 + effort);
+        }
+        Reversal {
+            row: self.row,
+            time_s: self.time_s,
+            position: self.position,
+            direction: self.direction as i8,
+            result: self.result,
+            curve: curve.into_iter().filter(|sums| sums.0 > 0.0).map(|(n, s, t)| (s / n, t / n)).collect(),
+        }
+    }
+}
+
+fn deviation(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt()
+}
+
+/// Mean over the reversals, each sense counted alike. The variance is the larger of what the fits expect and what the
+/// reversals show; the grid of the encoder is in every one of them alike.
+fn joined(turns: &[Turn], friction: &Friction, resolution: f64) -> Option<Estimate> {
+    let sense = |direction: f64| -> Vec<&Estimate> {
+        turns.iter().filter(|t| t.direction == direction).filter_map(|t| t.result.as_ref().ok()).collect()
+    };
+    let senses: Vec<Vec<&Estimate>> = [1.0, -1.0].map(sense).into_iter().filter(|s| !s.is_empty()).collect();
+    let count: usize = senses.iter().map(Vec::len).sum();
+    if count == 0 {
+        return None;
+    }
+    let mean = |of: fn(&Estimate) -> f64| mean_over(&senses, of);
+    let n = count as f64;
+    // The error of the motor's friction is the same in all of them and does not average out.
+    let common = mean_over(&senses, |e| (2.0 * friction.at(2.0 * e.sliding).1 / e.stiffness).powi(2));
+    let expected = (mean(|e| (0.5 * e.lost_motion.uncertainty).powi(2)) - common).max(0.0) / n;
+    let free = n - senses.len() as f64;
+    let values = |s: &Vec<&Estimate>| s.iter().map(|e| e.lost_motion.value).collect::<Vec<f64>>();
+    let squares: f64 = senses.iter().map(|s| deviation(&values(s)).powi(2) * (s.len() - 1) as f64).sum();
+    let seen = if free > 0.0 { (student_95(free) / 1.96).powi(2) * squares / free / n } else { 0.0 };
+    let grid = resolution * resolution / 6.0;
+    Some(Estimate {
+        lost_motion: Value {
+            value: mean(|e| e.lost_motion.value),
+            uncertainty: 2.0 * (expected.max(seen) + common + grid).sqrt(),
+        },
+        clearance: mean(|e| e.clearance),
+        windup: mean(|e| e.windup),
+        stiffness: mean(|e| e.stiffness),
+        sliding: mean(|e| e.sliding),
+        motor_friction: mean(|e| e.motor_friction),
+    })
+}
+
+/// Mean over the senses of the means over the reversals of each.
+fn mean_over(senses: &[Vec<&Estimate>], of: impl Fn(&Estimate) -> f64) -> f64 {
+    let each = senses.iter().map(|s| s.iter().map(|e| of(e)).sum::<f64>() / s.len() as f64);
+    each.sum::<f64>() / senses.len() as f64
+}
