@@ -155,7 +155,7 @@ fn tally(name: &str, seed: u64, count: usize, source: MotorFriction, change: imp
         let mut drive = Drive::random(&mut random);
         change(&mut drive);
         let (recording, truth) = drive.record(&mut random);
-        match estimate(&recording, "x") {
+        match estimate(&recording, "x", None) {
             Ok(found) => {
                 tally.seen += usize::from(found.motor_friction == source);
                 let value = found.mean.lost_motion;
@@ -225,8 +225,8 @@ fn refuses_by_name() {
     let mut random = Random(7);
     let drive = Drive::random(&mut random);
     let (one_way, _) = Drive { reversals: 0, released: 0.0, ..drive.clone() }.record(&mut random);
-    assert_eq!(estimate(&one_way, "x"), Err(Refusal::NoReversal));
+    assert_eq!(estimate(&one_way, "x", None), Err(Refusal::NoReversal));
     let (noise, _) = Drive { noise_nm: 30.0 * drive.table_friction_nm, ..drive }.record(&mut random);
-    let refused = estimate(&noise, "x").unwrap_err();
+    let refused = estimate(&noise, "x", None).unwrap_err();
     assert!(matches!(refused, Refusal::NoCurve(_)), "{refused}");
 }

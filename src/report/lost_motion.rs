@@ -2,13 +2,14 @@
 
 use super::plot::{Colour, Mark, Panel, PlotError, Series, svg};
 use crate::analysis::lost_motion::from_positions::{LostMotion, Trace};
+use crate::analysis::lost_motion::from_torque::TorqueLostMotion;
 
 /// Draws a result as SVG. Lengths in mm and µm, angles in degrees.
 ///
 /// # Errors
 /// When the result holds nothing to draw.
 pub fn picture(found: &LostMotion) -> Result<String, PlotError> {
-    let display = Display::of(found);
+    let display = Display::new(found.unit, found.lost_motion.uncertainty);
     svg(&[differences(found, &display), along_the_stroke(found, &display)])
 }
 
@@ -23,11 +24,11 @@ pub struct Display {
 }
 
 impl Display {
-    /// µm for lengths, degrees for angles; two digits of the uncertainty.
+    /// µm for lengths, degrees for angles; two digits of the uncertainty. `unit` is `mm` or `deg`, as the uncertainty.
     #[must_use]
-    pub fn of(found: &LostMotion) -> Self {
-        let (factor, unit, most) = if found.unit == "mm" { (1e3, "µm", 3) } else { (1.0, "°", 6) };
-        let digit = (factor * found.lost_motion.uncertainty).log10().floor();
+    pub fn new(unit: &str, uncertainty: f64) -> Self {
+        let (factor, unit, most) = if unit == "mm" { (1e3, "µm", 3) } else { (1.0, "°", 6) };
+        let digit = (factor * uncertainty).log10().floor();
         let decimals =
             if digit.is_finite() { (1.0 - digit).clamp(0.0, f64::from(most)) as usize } else { most as usize };
         Display { factor, unit, decimals }
@@ -99,4 +100,35 @@ fn along_the_stroke(found: &LostMotion, display: &Display) -> Panel {
             },
         ],
     }
+}
+
+/// Draws torque against travel since each reversal, with what the fit made of it, as SVG.
+///
+/// # Errors
+/// When the result holds nothing to draw.
+pub fn torque_picture(found: &TorqueLostMotion) -> Result<String, PlotError> {
+    let mean = &found.mean;
+    let display = Display::new(found.unit, mean.lost_motion.uncertainty);
+    let (word, quantity, unit) =
+        if found.effort_unit == "nm" { ("Torque", "torque", "N·m") } else { ("Force", "force", "N") };
+    let way = |direction: i8, name: &str, colour| {
+        let curves = found.reversals.iter().filter(|r| r.direction == direction && r.result.is_ok());
+        let scaled = |curve: &[(f64, f64)]| curve.iter().map(|(s, t)| (display.factor * s, *t)).collect();
+        Series { name: name.into(), colour, marks: curves.map(|r| Mark::Line(scaled(&r.curve))).collect() }
+    };
+    let panel = Panel {
+        title: format!("{word} after a reversal, axis {}", found.channel.to_uppercase()),
+        subtitle: format!(
+            "lost motion estimated from torque {} ± {} {u} (k = 2) = clearance {} {u} + wind-up {} {u}",
+            display.number(mean.lost_motion.value),
+            display.number(mean.lost_motion.uncertainty),
+            display.number(mean.clearance),
+            display.number(mean.windup),
+            u = display.unit
+        ),
+        x_label: format!("motor travel since the reversal / {}", display.unit),
+        y_label: format!("{quantity} in the new direction / {unit}"),
+        series: vec![way(1, "turning to positive", Colour::Blue), way(-1, "turning to negative", Colour::Orange)],
+    };
+    svg(&[panel])
 }

@@ -16,6 +16,7 @@ use crate::cycle::backlash::curve::Curve;
 use crate::cycle::backlash::fit::{Fit, Fitted, Levels};
 use crate::cycle::backlash::verdict::check_reversal;
 use crate::error::status_text;
+use crate::machine::Axis;
 use crate::recording::{Recording, RecordingError, Signal, Unit, file_row};
 
 /// How friction on the motor's side was found.
@@ -84,13 +85,15 @@ pub struct TorqueLostMotion {
     pub reversals: Vec<Reversal>,
 }
 
-/// Estimates the lost motion of `channel` from position and torque (or force).
+/// Estimates the lost motion of `channel` from position and torque (or force). Where the axis' model is given, its inertia and
+/// viscous friction are taken off the torque, so that a reversal need not be quite slow.
 ///
 /// # Errors
 /// A missing column, no reversal, or none whose curve can be fitted.
-pub fn estimate(recording: &Recording, channel: &str) -> Result<TorqueLostMotion, Refusal> {
-    let (pieces, unit, effort_unit) = pieces(recording, channel)?;
-    let mut turns: Vec<Turn> = pieces.iter().flat_map(Piece::turns).collect();
+pub fn estimate(recording: &Recording, channel: &str, model: Option<&Axis>) -> Result<TorqueLostMotion, Refusal> {
+    let (pieces, unit, effort_unit) = pieces(recording, channel, model)?;
+    let usual = usual_levels(&pieces);
+    let mut turns: Vec<Turn> = pieces.iter().flat_map(|piece| piece.turns(usual)).collect();
     if turns.is_empty() {
         return Err(Refusal::NoReversal);
     }
@@ -125,7 +128,7 @@ struct Piece {
     resolution: f64,
 }
 
-fn pieces(recording: &Recording, channel: &str) -> Result<(Vec<Piece>, Unit, Unit), Refusal> {
+fn pieces(recording: &Recording, channel: &str, model: Option<&Axis>) -> Result<(Vec<Piece>, Unit, Unit), Refusal> {
     let position = recording.column(channel, Signal::Position)?;
     let effort = match recording.get(channel, Signal::Force) {
         Some(force) => force,
@@ -139,7 +142,11 @@ fn pieces(recording: &Recording, channel: &str) -> Result<(Vec<Piece>, Unit, Uni
         let take = |values: &[f64]| -> Vec<f64> { rows.iter().map(|row| values[*row]).collect() };
         let motor = take(&positions);
         let resolution = grid(&motor).unwrap_or(0.0);
-        let track = Track { time_s: take(&recording.time_s), motor, difference: take(&efforts) };
+        let mut track = Track { time_s: take(&recording.time_s), motor, difference: take(&efforts) };
+        if let Some(model) = model {
+            let (belief, per_load) = (model.belief(), model.drive.motor_per_load());
+            track.take_off_motion(per_load * belief.inertia, per_load * belief.viscous);
+        }
         Piece { sweeps: track.fine_sweeps(), track, rows, resolution }
     };
     Ok((rows.into_iter().map(piece).collect(), unit, effort_unit))
@@ -161,11 +168,11 @@ struct Turn {
 }
 
 impl Piece {
-    fn turns(&self) -> Vec<Turn> {
-        (1..self.sweeps.len()).map(|i| self.turn(i)).collect()
+    fn turns(&self, usual: [f64; 2]) -> Vec<Turn> {
+        (1..self.sweeps.len()).map(|i| self.turn(i, usual)).collect()
     }
 
-    fn turn(&self, i: usize) -> Turn {
+    fn turn(&self, i: usize, usual: [f64; 2]) -> Turn {
         let (before, after) = (&self.sweeps[i - 1], &self.sweeps[i]);
         let (row, direction) = (after.rows.start, after.direction);
         let position = self.track.motor[row];
@@ -176,14 +183,14 @@ impl Piece {
             .collect();
         // A scan that ends soon after the table slides holds too little sliding of its own; the sweep before last went the
         // same way.
-        let own = sliding(after, direction);
-        let earlier = i.checked_sub(2).and_then(|i| sliding(&self.sweeps[i], direction));
+        let own = sliding(after, direction, usual);
+        let earlier = i.checked_sub(2).and_then(|i| sliding(&self.sweeps[i], direction, usual));
         let after_level = match (own, earlier) {
             (Some(own), Some(earlier)) if earlier.error < own.error && similar(&own, &earlier) => Some(earlier),
             (None, earlier) => earlier,
             (own, _) => own,
         };
-        let levels = match (sliding(before, direction), after_level) {
+        let levels = match (sliding(before, direction, usual), after_level) {
             (Some(before), Some(after)) => Ok((before, after)),
             (None, _) => Err("the axis does not slide steadily before it".to_owned()),
             (_, None) => Err("the axis does not slide steadily after it".to_owned()),
@@ -206,9 +213,29 @@ fn similar(a: &Mean, b: &Mean) -> bool {
     (a.value - b.value).abs() < 4.0 * a.error.hypot(b.error) + 0.1 * a.value.abs()
 }
 
-/// The effort of steady sliding in a sweep, in the sense of `direction`: over the last third of the way, at one speed. `None`
-/// where the sweep is too short to tell.
-fn sliding(sweep: &Sweep, direction: f64) -> Option<Mean> {
+/// The effort of sliding in the negative and the positive direction, over the longest ways of the recording.
+fn usual_levels(pieces: &[Piece]) -> [f64; 2] {
+    [-1.0, 1.0].map(|direction| {
+        let sweeps = || pieces.iter().flat_map(|piece| &piece.sweeps).filter(|sweep| sweep.direction == direction);
+        let longest = sweeps().map(Sweep::way).fold(0.0, f64::max);
+        let long = sweeps().filter(|sweep| sweep.way() > 0.5 * longest);
+        let levels: Vec<f64> = long.filter_map(steady).map(|mean| mean.value).collect();
+        quantile(&levels, 0.5).unwrap_or(f64::NAN)
+    })
+}
+
+/// The effort of sliding in a sweep, in the sense of `direction`; `None` where the axis does not slide as it usually does: a
+/// short way in which the drive only winds up is steady too, but is no sliding.
+fn sliding(sweep: &Sweep, direction: f64, usual: [f64; 2]) -> Option<Mean> {
+    const LIKE: f64 = 0.25;
+    let mean = steady(sweep)?;
+    let expected = usual[usize::from(sweep.direction > 0.0)];
+    let like = (mean.value - expected).abs() <= LIKE * (usual[1] - usual[0]).abs();
+    like.then_some(Mean { value: direction * mean.value, ..mean })
+}
+
+/// The effort in a sweep over the last third of the way, at one speed. `None` where the sweep is too short to tell.
+fn steady(sweep: &Sweep) -> Option<Mean> {
     const FEWEST_ROWS: usize = 20;
     let (first, last) = (sweep.moving.first()?, sweep.moving.last()?);
     let way = (last.motor - first.motor).abs();
@@ -216,7 +243,7 @@ fn sliding(sweep: &Sweep, direction: f64) -> Option<Mean> {
     let speeds: Vec<f64> = late.iter().map(|s| s.speed.abs()).collect();
     let usual = quantile(&speeds, 0.5)?;
     let steady: Vec<f64> =
-        late.iter().filter(|s| (s.speed.abs() - usual).abs() < 0.2 * usual).map(|s| direction * s.difference).collect();
+        late.iter().filter(|s| (s.speed.abs() - usual).abs() < 0.2 * usual).map(|s| s.difference).collect();
     if steady.len() < FEWEST_ROWS { None } else { correlated_mean(&steady) }
 }
 
@@ -263,9 +290,11 @@ fn mean_of(values: &[f64]) -> Option<(f64, f64)> {
 /// The motor's friction from each short way back and forth: half the distance of two parallel lines of effort over position.
 fn probes(piece: &Piece, about: f64) -> Vec<f64> {
     const FEWEST_ROWS: usize = 10;
-    let one = |ends: &[Sweep]| {
-        let short = 0.6 * about;
-        if ends[0].way() > short {
+    let one = |ways: &[Sweep]| {
+        let [into, ends @ ..] = ways else { return None };
+        // Only the first way back, from where the table slid, and the way forth again: then the table has not moved between.
+        let short = ends[0].way() < 0.6 * about && into.way() > 1.5 * ends[0].way();
+        if !short || ends[1].way() < 0.9 * ends[0].way() {
             return None;
         }
         let back: Vec<&Sample> = ends[0].moving.iter().collect();
@@ -280,7 +309,7 @@ fn probes(piece: &Piece, about: f64) -> Vec<f64> {
         }
         Some(0.5 * ends[1].direction * apart(&back, &forth)).filter(|friction| *friction >= 0.0)
     };
-    piece.sweeps.windows(2).filter_map(one).collect()
+    piece.sweeps.windows(3).filter_map(one).collect()
 }
 
 /// How far the second line lies above the first, both with one slope.
@@ -341,7 +370,7 @@ impl Turn {
         }
         let fitted =
             check_reversal(fit.result()).map_err(|fault| status_text(fault.code).trim_end_matches('\0').to_owned())?;
-        if self.way < 1.5 * fitted.lost_motion {
+        if self.way < 1.2 * fitted.lost_motion {
             return Err("the way before or after it is too short for the table to slide".into());
         }
         Ok(fitted)

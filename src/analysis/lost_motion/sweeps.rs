@@ -55,6 +55,19 @@ impl Track {
         self.cut(smallest_travel(&self.motor))
     }
 
+    /// Takes `inertia`·acceleration and `viscous`·speed, in effort per 1/s² and 1/s, off an effort that stands for the
+    /// difference.
+    pub fn take_off_motion(&mut self, inertia: f64, viscous: f64) {
+        let noise = white_noise(&self.motor).unwrap_or(0.0).max(grid(&self.motor).unwrap_or(0.0) / 12f64.sqrt());
+        for sweep in self.fine_sweeps() {
+            let half = self.half_window(&sweep.rows, noise);
+            // The row of a turn ends one sweep and begins the next.
+            for row in sweep.rows.start..sweep.rows.end - 1 {
+                self.difference[row] -= inertia * self.accel(row, half) + viscous * self.speed(row, half);
+            }
+        }
+    }
+
     fn cut(&self, travel: f64) -> Vec<Sweep> {
         let mut cuts = vec![0];
         cuts.extend(turning_points(&self.motor, travel));

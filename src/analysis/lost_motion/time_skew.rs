@@ -43,14 +43,15 @@ impl Skew {
         }
     }
 
-    /// The mean of independent estimates by their errors; where they disagree by more than these, the errors were too small
-    /// and grow by Birge's ratio.
+    /// The mean of estimates by their errors. Sweeps over the same stretch err alike, so that their mean is no better than one of
+    /// them; where they disagree by more than their errors, these were too small and grow by Birge's ratio.
     pub fn join(estimates: &[Skew]) -> Option<Skew> {
         let weight: f64 = estimates.iter().map(|e| e.error_s.powi(-2)).sum();
         let delay_s = estimates.iter().map(|e| e.delay_s * e.error_s.powi(-2)).sum::<f64>() / weight;
         let misfit: f64 = estimates.iter().map(|e| ((e.delay_s - delay_s) / e.error_s).powi(2)).sum();
-        let birge = (misfit / (estimates.len().max(2) - 1) as f64).max(1.0);
-        let error_s = (birge / weight).sqrt();
+        let n = estimates.len().max(2) as f64;
+        let birge = (misfit / (n - 1.0)).max(1.0);
+        let error_s = (birge / weight * estimates.len() as f64).sqrt();
         (delay_s.is_finite() && error_s.is_finite()).then_some(Skew { delay_s, error_s })
     }
 }
@@ -94,12 +95,17 @@ pub(super) fn from_places(reversals: &[(i8, Vec<Place>)], resolution: f64) -> Op
 /// small part of it: the finer the spline, the less of them is mistaken for a delay.
 const MOST_INTERVALS: usize = 32;
 const ROWS_PER_INTERVAL: usize = 12;
+/// Below this share of the top speed the table may stick while the motor still creeps: that is no delay.
+const LEAST_SPEED: f64 = 0.3;
 /// The fewest rows a sweep must have for a fit.
 const FEWEST_ROWS: usize = 60;
 
 /// The delay from one sweep, from where the table moves on. `speed_noise` is the standard deviation of the noise in the speeds,
 /// `resolution` the step of the differences: residuals below it are luck, not knowledge.
 pub(super) fn from_sweep(samples: &[Sample], speed_noise: f64, resolution: f64) -> Option<Skew> {
+    let top = samples.iter().map(|s| s.speed.abs()).fold(0.0, f64::max);
+    let fast: Vec<Sample> = samples.iter().filter(|s| s.speed.abs() > LEAST_SPEED * top).copied().collect();
+    let samples = fast.as_slice();
     let first = samples.first().filter(|_| samples.len() >= FEWEST_ROWS)?;
     let (low, high) =
         samples.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(s.motor), h.max(s.motor)));
@@ -136,15 +142,19 @@ pub(super) fn from_sweep(samples: &[Sample], speed_noise: f64, resolution: f64) 
     let solution = &inverse * right;
     let residual =
         |s: &Sample| s.difference - first.difference - row(s).iter().map(|(i, x)| x * solution[*i]).sum::<f64>();
-    let residuals: Vec<f64> = samples.iter().map(residual).collect();
-    // The error of their mean tells how much more than its share each residual counts when neighbours move together.
-    let n = samples.len() as f64;
-    let squares = residuals.iter().map(|r| r * r).sum::<f64>();
-    let together = correlated_mean(&residuals)?.error.powi(2) * n * n / squares.max(f64::MIN_POSITIVE);
-    let scatter = (squares / (n - (a + 1) as f64).max(1.0)).max(resolution * resolution / 12.0);
-    let variance = scatter * together.max(1.0) * inverse[(d, d)];
+    // What each row adds to the slope. Speed changes in few rows, where the axis brakes: their residuals are what counts, and
+    // neighbours move together. A residual below the step of the differences is luck.
+    let floor = resolution / 12f64.sqrt();
+    let influence = |s: &Sample| {
+        let leverage: f64 = row(s).iter().map(|(i, x)| inverse[(d, *i)] * x).sum();
+        let left = residual(s);
+        leverage * left.signum() * left.abs().max(floor)
+    };
+    let influences: Vec<f64> = samples.iter().map(influence).collect();
+    let mean = correlated_mean(&influences)?;
+    let error = samples.len() as f64 * mean.error * student_95(mean.freedom) / 1.96;
     let signal = speed * (1.0 - noise_share);
-    let estimate = Skew { delay_s: solution[d] / signal, error_s: variance.sqrt() / signal };
+    let estimate = Skew { delay_s: solution[d] / signal, error_s: error / signal };
     (estimate.delay_s.is_finite() && estimate.error_s > 0.0).then_some(estimate)
 }
 

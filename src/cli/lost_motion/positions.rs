@@ -1,95 +1,18 @@
-//! `gib lost-motion`: what a reversal loses, from a recording.
+//! What `gib lost-motion` says of two positions.
 
 use std::fmt::Write;
-use std::path::PathBuf;
 
-use clap::Args;
 use gib::analysis::lost_motion::Value;
-use gib::analysis::lost_motion::from_positions::{LostMotion, Stretch, measure};
-use gib::recording::{Recording, Signal};
-use gib::report::lost_motion::{Display, picture};
+use gib::analysis::lost_motion::from_positions::{LostMotion, Stretch};
+use gib::report::lost_motion::Display;
 use serde_json::{Map, Value as Json, json};
 
-use super::table::Table;
-use super::{Answer, Result};
+use super::compare;
+use crate::cli::table::Table;
 
-/// Measures the lost motion of an axis: what a reversal of the motor does not bring to the table
-///
-/// Compares motor and table position at the same place on the way there and back, wherever both move steadily. Record slow
-/// motion (about 1 mm/s) there and back over at least ten times the lost motion, several times. Lost motion is given with its
-/// expanded uncertainty (k = 2, about 95 %): in µm for lengths, in degrees for angles.
-///
-/// Ends with 1 when the lost motion is not larger than its uncertainty.
-#[derive(Args)]
-pub struct LostMotionCommand {
-    /// The recording: CSV with <axis>.position and <axis>.table_position
-    recording: PathBuf,
-    /// Axis letter, where the recording holds several
-    #[arg(long, value_name = "LETTER")]
-    axis: Option<String>,
-    /// Answer as JSON
-    #[arg(long)]
-    json: bool,
-    /// Write a picture of motor − table along the stroke
-    #[arg(long, value_name = "OUT.svg")]
-    plot: Option<PathBuf>,
-    /// Compare with this lost motion, measured otherwise (linear axis), in µm
-    #[arg(long, value_name = "V", conflicts_with = "measured_deg")]
-    measured_um: Option<f64>,
-    /// Compare with this lost motion, measured otherwise (rotary axis), in degrees
-    #[arg(long, value_name = "V")]
-    measured_deg: Option<f64>,
-}
-
-impl LostMotionCommand {
-    /// Measures and tells.
-    pub fn run(&self) -> Result {
-        let recording = Recording::open(&self.recording)?;
-        let axis = self.axis(&recording)?;
-        let found = measure(&recording, &axis).map_err(|why| format!("{}: axis {axis}: {why}", recording.file))?;
-        let measured = self.measured(&found)?;
-        if let Some(path) = &self.plot {
-            std::fs::write(path, picture(&found)?)
-                .map_err(|why| format!("{}: cannot be written: {why}", path.display()))?;
-        }
-        let text = if self.json {
-            serde_json::to_string_pretty(&as_json(&found, measured))? + "\n"
-        } else {
-            text(&recording.file, &found, measured)
-        };
-        Ok(Answer { text, good: found.significant })
-    }
-
-    fn axis(&self, recording: &Recording) -> std::result::Result<String, String> {
-        let axes: Vec<&str> =
-            recording.channels().into_iter().filter(|c| recording.get(c, Signal::Position).is_some()).collect();
-        match (&self.axis, axes.as_slice()) {
-            (Some(axis), _) => Ok(axis.clone()),
-            (None, [one]) => Ok((*one).to_owned()),
-            (None, []) => Err(format!("{}: has no column <axis>.position_<unit>", recording.file)),
-            (None, several) => {
-                Err(format!("{}: has the axes {}; choose one with --axis", recording.file, several.join(", ")))
-            }
-        }
-    }
-
-    /// The value to compare with, in µm or degrees as the axis asks for.
-    fn measured(&self, found: &LostMotion) -> std::result::Result<Option<f64>, String> {
-        let (given, other, flag) = if found.unit == "mm" {
-            (self.measured_um, self.measured_deg, "--measured-um")
-        } else {
-            (self.measured_deg, self.measured_um, "--measured-deg")
-        };
-        match (given, other) {
-            (_, Some(_)) => Err(format!("axis {} moves in {}; compare with {flag}", found.channel, found.unit)),
-            (Some(value), _) if !value.is_finite() => Err(format!("{flag} is {value}; expected a number")),
-            (given, None) => Ok(given),
-        }
-    }
-}
-
-fn text(file: &str, found: &LostMotion, measured: Option<f64>) -> String {
-    let display = Display::of(found);
+/// One screen for people.
+pub fn text(file: &str, found: &LostMotion, measured: Option<f64>) -> String {
+    let display = Display::new(found.unit, found.lost_motion.uncertainty);
     let shown = |value: &Value| format!("{} ± {}", display.number(value.value), display.number(value.uncertainty));
     let place = |position: f64| format!("{position:.3}");
     let mut text = String::new();
@@ -117,7 +40,7 @@ fn text(file: &str, found: &LostMotion, measured: Option<f64>) -> String {
         display.unit
     );
     if let Some(measured) = measured {
-        let _ = writeln!(text, "  {}", comparison(found, &display, measured));
+        let _ = writeln!(text, "  {}", compare(&found.lost_motion, &display, measured));
     }
 
     let mut table = Table::new(["row", "time s", "at", "turns to", "speed", "lost motion", "remark"], 0);
@@ -144,20 +67,8 @@ fn text(file: &str, found: &LostMotion, measured: Option<f64>) -> String {
     text + &table.text()
 }
 
-fn comparison(found: &LostMotion, display: &Display, measured: f64) -> String {
-    let difference = display.factor * found.lost_motion.value - measured;
-    let within = difference.abs() <= display.factor * found.lost_motion.uncertainty;
-    format!(
-        "measured otherwise {measured} {0}: this is {1:+.2$} {0} from it, {3} its uncertainty",
-        display.unit,
-        difference,
-        display.decimals,
-        if within { "within" } else { "beyond" }
-    )
-}
-
 /// Keys end in their unit: `lost_motion_um` and `position_mm`, or `lost_motion_deg` and `position_deg`.
-fn as_json(found: &LostMotion, measured: Option<f64>) -> Json {
+pub fn as_json(found: &LostMotion, measured: Option<f64>) -> Json {
     let (factor, unit) = if found.unit == "mm" { (1e3, "um") } else { (1.0, "deg") };
     let at = found.unit;
     let put = |object: &mut Map<String, Json>, value: &Value| {
