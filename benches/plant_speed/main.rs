@@ -1,6 +1,7 @@
 //! How many times real time the plant runs on one core at a 25 µs step, beside a plain C loop of the same model.
 //!
 //! `cargo bench --bench plant_speed`. Needs a C compiler as `cc`; without one only the plant's own figure is printed.
+//! Where python3 has `mujoco`, its figure for one slide with friction stands below.
 //! The two must end at the same position, else they are not the same model and the benchmark fails.
 
 use gib::machine::{Axis, Effect, Machine};
@@ -55,6 +56,10 @@ fn main() -> ExitCode {
         }
         println!();
     }
+    match of_mujoco() {
+        Some(speed) => println!("MuJoCo, one slide with friction {speed:6.1}"),
+        None => println!("MuJoCo: not installed for python3, left out"),
+    }
     if same { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
@@ -69,6 +74,13 @@ fn of_plant(axis: &Axis) -> (f64, f64) {
     let trace = simulate(axis, &command, &Setup::default());
     let seconds = cpu_s() - begin;
     (seconds, trace.ok().and_then(|trace| trace.position.last().copied()).unwrap_or(f64::NAN))
+}
+
+/// Times real time of MuJoCo, where Python has it.
+fn of_mujoco() -> Option<f64> {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/plant_speed/mujoco_slide.py");
+    let output = Command::new("python3").arg(script).output().ok()?;
+    String::from_utf8_lossy(&output.stdout).trim().parse().ok()
 }
 
 /// Seconds of computing by this process, so that others on the machine do not count.

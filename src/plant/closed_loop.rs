@@ -62,6 +62,24 @@ pub fn replay(axis: &Axis, observed: &Observed, prediction: &TorquePrediction) -
     }))
 }
 
+/// Takes the torque of rows at rest from the replay.
+///
+/// What dry friction holds at rest is not in the motion: it is what the servo has come to by then, which the replay
+/// knows. At rest means less travel within a period of the motion's cut-off than reversing friction takes.
+pub fn fill_rest(prediction: &mut TorquePrediction, observed: &Observed, replayed: &ClosedLoop) {
+    let motion = &observed.motion;
+    let slow = 10.0 * motion.resolution * motion.cutoff_hz;
+    let around = (0.5 / (motion.cutoff_hz * observed.period_s)).ceil() as usize;
+    // Rows in a row that are slow, up to and with this one.
+    let mut length = 0;
+    for i in 0..motion.velocity.len() {
+        length = if motion.velocity[i].abs() < slow { length + 1 } else { 0 };
+        if length > 2 * around {
+            prediction.torque[i - around] = replayed.torque[i - around];
+        }
+    }
+}
+
 /// The command at the start of each servo cycle: interpolated between rows, held over rows without one.
 #[must_use]
 pub fn command_of_cycles(time_s: &[f64], command: &[f64], period: f64, cycles: usize) -> Vec<f64> {
