@@ -1,6 +1,6 @@
 //! Family `backlash`: lost motion of one axis from motor torque, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, placed, versioned};
+use super::guard::{Instance, guarded, instance, instance_mut, placed, versioned};
 use super::types::GibErrorDetail;
 use crate::cycle::backlash::config::BacklashConfig;
 use crate::cycle::backlash::io::{BacklashInput, BacklashOutput, GIB_BACKLASH_FAILED};
@@ -12,6 +12,8 @@ use core::ffi::c_void;
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
 const ALIVE: u64 = 0x6769_625f_626c_0001;
+/// The same, and nothing is under way, so that a step has only to say "stay".
+const QUIET: u64 = 0x6769_625f_626c_0002;
 
 /// A lost-motion measurement of one axis. Opaque; its size is `gib_backlash_size()`.
 #[repr(C, align(16))]
@@ -21,22 +23,31 @@ pub struct GibBacklash {
     machine: Backlash,
 }
 
-impl super::guard::Instance for GibBacklash {
-    const ALIVE: u64 = ALIVE;
-    fn alive(&self) -> u64 {
-        self.alive
+impl Instance for GibBacklash {
+    fn alive(&self) -> bool {
+        self.alive == ALIVE || self.alive == QUIET
     }
     fn new() -> GibBacklash {
-        GibBacklash { alive: ALIVE, last: Fault::NONE, machine: Backlash::default() }
+        GibBacklash { alive: QUIET, last: Fault::NONE, machine: Backlash::default() }
     }
     fn bury(&mut self) {
         self.alive = 0;
     }
 }
 
+impl GibBacklash {
+    /// Renews the mark after the machine may have changed.
+    #[inline(always)]
+    fn mark(&mut self) {
+        self.alive = if self.machine.quiet() { QUIET } else { ALIVE };
+    }
+}
+
 /// Runs a call that can be refused, and keeps the reason for `_last_error`.
 fn refusable(handle: &mut GibBacklash, call: impl FnOnce(&mut Backlash) -> Result<(), Fault>) -> i32 {
-    match call(&mut handle.machine) {
+    let outcome = call(&mut handle.machine);
+    handle.mark();
+    match outcome {
         Ok(()) => {
             handle.last = Fault::NONE;
             GIB_OK
@@ -151,32 +162,63 @@ pub unsafe extern "C" fn gib_backlash_step(
     input: *const BacklashInput,
     output: *mut BacklashOutput,
 ) -> i32 {
-    // SAFETY: the caller promises each is NULL or valid.
-    let (handle, input, output) = unsafe { (handle.as_mut(), input.as_ref(), output.as_mut()) };
-    match (handle, input, output) {
-        (Some(handle), Some(input), Some(output)) if handle.alive == ALIVE => {
-            *output = *handle.machine.step(input);
-            output.status
-        }
-        (handle, input, output) => misused(handle, input, output),
+    if handle.is_null() || input.is_null() || output.is_null() {
+        // SAFETY: the caller promises each is NULL or valid.
+        return unsafe { misused(handle, input, output) };
     }
+    // SAFETY: as above, and none is NULL.
+    let (handle, input, output) = unsafe { (&mut *handle, &*input, &mut *output) };
+    // The cheap cycle, in which an axis spends its life. `x - x` is NaN for NaN and infinity.
+    let not_finite = input.position_mm - input.position_mm;
+    if handle.alive == QUIET && !not_finite.is_nan() {
+        *output = *handle.machine.rest_at(input.position_mm);
+        return handle.machine.output().status;
+    }
+    step(handle, input, output)
+}
+
+/// A cycle in which something is under way. `extern "C"`: it cannot unwind, so that it is called by a jump.
+#[inline(never)]
+extern "C" fn step(handle: &mut GibBacklash, input: &BacklashInput, output: &mut BacklashOutput) -> i32 {
+    if handle.alive == ALIVE && handle.machine.quick(input) {
+        *output = *handle.machine.output();
+        return handle.machine.output().status;
+    }
+    step_in_full(handle, input, output)
+}
+
+/// Any cycle, or one of no living instance.
+#[inline(never)]
+extern "C" fn step_in_full(handle: &mut GibBacklash, input: &BacklashInput, output: &mut BacklashOutput) -> i32 {
+    if !handle.alive() {
+        // SAFETY: all three are references.
+        return unsafe { misused(handle, input, output) };
+    }
+    *output = *handle.machine.step(input);
+    handle.mark();
+    output.status
 }
 
 /// A step without an instance, an input or an output: nothing moves, and the position asked for is the present one.
+///
+/// # Safety
+/// Each is NULL or valid.
 #[cold]
-fn misused(
-    handle: Option<&mut GibBacklash>,
-    input: Option<&BacklashInput>,
-    output: Option<&mut BacklashOutput>,
+unsafe extern "C" fn misused(
+    handle: *mut GibBacklash,
+    input: *const BacklashInput,
+    output: *mut BacklashOutput,
 ) -> i32 {
+    // SAFETY: the caller's promise.
+    let (handle, input, output) = unsafe { (handle.as_mut(), input.as_ref(), output.as_mut()) };
     let status = match &handle {
-        Some(handle) if handle.alive != ALIVE => GIB_ERR_HANDLE,
+        Some(handle) if !handle.alive() => GIB_ERR_HANDLE,
         _ => GIB_ERR_NULL,
     };
     let position = input.map_or(0.0, |input| input.position_mm);
     if let Some(output) = output {
         *output = match handle {
-            Some(handle) if handle.alive == ALIVE => *handle.machine.output(),
+            Some(handle) if handle.alive() => *handle.machine.output(),
             _ => BacklashOutput {
                 target_position_mm: if position.is_finite() { position } else { 0.0 },
                 phase: GIB_BACKLASH_FAILED,
@@ -204,7 +246,9 @@ fn misused(
 pub unsafe extern "C" fn gib_backlash_abort(handle: *mut GibBacklash) -> i32 {
     guarded(|| {
         // SAFETY: the caller's promise.
-        unsafe { instance_mut(handle) }?.machine.abort();
+        let handle = unsafe { instance_mut(handle) }?;
+        handle.machine.abort();
+        handle.mark();
         Ok(GIB_OK)
     })
 }

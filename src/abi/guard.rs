@@ -50,10 +50,8 @@ pub unsafe fn versioned<T: Copy>(pointer: *const T, first_size: usize) -> Result
 
 /// A type that C holds by an opaque handle.
 pub trait Instance: Sized {
-    /// Mark of a living instance.
-    const ALIVE: u64;
-    /// The mark in this memory.
-    fn alive(&self) -> u64;
+    /// Whether this memory carries the mark of a living instance.
+    fn alive(&self) -> bool;
     /// An idle instance.
     fn new() -> Self;
     /// Takes the mark away, so that a later call is refused instead of trusted.
@@ -70,7 +68,7 @@ pub trait Instance: Sized {
 pub unsafe fn instance<'a, T: Instance>(handle: *const T) -> Result<&'a T, i32> {
     // SAFETY: the caller's promise.
     let instance = unsafe { handle.as_ref() }.ok_or(GIB_ERR_NULL)?;
-    if instance.alive() == T::ALIVE { Ok(instance) } else { Err(GIB_ERR_HANDLE) }
+    if instance.alive() { Ok(instance) } else { Err(GIB_ERR_HANDLE) }
 }
 
 /// The instance behind a handle, to be changed.
@@ -83,7 +81,7 @@ pub unsafe fn instance<'a, T: Instance>(handle: *const T) -> Result<&'a T, i32> 
 pub unsafe fn instance_mut<'a, T: Instance>(handle: *mut T) -> Result<&'a mut T, i32> {
     // SAFETY: the caller's promise.
     let instance = unsafe { handle.as_mut() }.ok_or(GIB_ERR_NULL)?;
-    if instance.alive() == T::ALIVE { Ok(instance) } else { Err(GIB_ERR_HANDLE) }
+    if instance.alive() { Ok(instance) } else { Err(GIB_ERR_HANDLE) }
 }
 
 /// Makes an instance in the caller's memory.

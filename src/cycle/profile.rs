@@ -11,46 +11,74 @@ pub struct Profile {
     pub position: f64,
     /// Commanded speed in mm per cycle, signed.
     pub speed: f64,
-    /// Where the move ends, in mm.
-    pub goal: f64,
-    /// Largest speed in mm per cycle, positive.
-    pub speed_max: f64,
-    /// Largest change of speed in mm per cycle², positive.
-    pub acceleration: f64,
+    goal: f64,
+    speed_max: f64,
+    acceleration: f64,
+    /// How far from the goal the long middle of the move ends.
+    braking: f64,
 }
 
 impl Profile {
-    /// At rest at `position`.
+    /// At rest at `position` (mm), with the largest change of speed, mm per cycle², positive.
     #[must_use]
     pub fn at_rest(position: f64, acceleration: f64) -> Profile {
-        Profile { position, speed: 0.0, goal: position, speed_max: acceleration, acceleration }
+        let mut profile = Profile { position, acceleration, ..Profile::default() };
+        profile.go(position, acceleration);
+        profile
     }
 
-    /// Sets a new goal and speed bound; the present speed is kept.
+    /// Sets a new goal (mm) and the largest speed (mm per cycle, positive); the present speed is kept.
     pub fn go(&mut self, goal: f64, speed_max: f64) {
         self.goal = goal;
         self.speed_max = speed_max;
+        self.braking = speed_max * (speed_max + self.acceleration) / (2.0 * self.acceleration) + 2.0 * speed_max;
     }
 
     /// Makes the place where the axis can come to rest soonest the new goal.
     pub fn stop(&mut self) {
-        self.goal = self.position + self.speed * self.speed.abs() / (2.0 * self.acceleration);
+        let way = self.speed * self.speed.abs() / (2.0 * self.acceleration);
+        self.go(self.position + way, self.speed.abs() + self.acceleration);
+    }
+
+    /// Comes to rest here and now; for an axis that is no longer under command, or one at a creep.
+    pub fn halt(&mut self) {
+        self.speed = 0.0;
+        self.goal = self.position;
+    }
+
+    /// Way left to the goal, mm, signed.
+    #[inline(always)]
+    #[must_use]
+    pub fn left(&self) -> f64 {
+        self.goal - self.position
+    }
+
+    /// Whether the next cycle is one at constant speed, with the goal further than braking takes.
+    #[inline(always)]
+    #[must_use]
+    pub fn cruises(&self) -> bool {
+        self.speed.abs() == self.speed_max && self.left() * self.speed > self.braking * self.speed_max
+    }
+
+    /// A cycle at constant speed; only right when `cruises`.
+    #[inline(always)]
+    pub fn cruise_on(&mut self) {
+        self.position += self.speed;
     }
 
     /// Advances by one cycle. Returns true once the goal is reached and the axis commanded to rest.
-    #[inline(always)]
     pub fn step(&mut self) -> bool {
         let a = self.acceleration;
-        let left = self.goal - self.position;
-        // Braking by a each cycle takes v + (v − a) + … = v·(v + a)/(2a); the largest v that still stops in time.
-        let stops = (0.25 * a * a + 2.0 * a * left.abs()).sqrt() - 0.5 * a;
-        let wanted = stops.min(self.speed_max).copysign(left);
+        let left = self.left();
         if left.abs() <= a && self.speed.abs() <= 1.5 * a {
             self.position = self.goal;
             self.speed = 0.0;
             return true;
         }
-        let speed = wanted.max(self.speed - a).min(self.speed + a);
+        // Braking by a each cycle takes v + (v − a) + … = v·(v + a)/(2a); the largest v that still stops in time.
+        let stops = (0.25 * a * a + 2.0 * a * left.abs()).sqrt() - 0.5 * a;
+        let wanted = lower(stops, self.speed_max).copysign(left);
+        let speed = lower(higher(wanted, self.speed - a), self.speed + a);
         // Between whole multiples of a the sum above is short by up to a/8, which must not carry past the goal.
         let past = speed * left > left * left;
         self.speed = if past { left } else { speed };
@@ -65,6 +93,18 @@ impl Profile {
         // A wrong-way speed is first brought to rest, and its way walked back.
         left / self.speed_max + 4.0 * (self.speed_max + self.speed.abs()) / self.acceleration + 16.0
     }
+}
+
+/// The lower of two numbers, neither NaN: one instruction, where `f64::min` takes seven.
+#[inline(always)]
+fn lower(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The higher of two numbers, neither NaN.
+#[inline(always)]
+fn higher(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 #[cfg(test)]

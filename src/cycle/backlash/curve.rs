@@ -7,61 +7,63 @@
 /// Bins a curve can hold; a longer scan takes wider bins.
 pub const BINS: usize = 1024;
 
-/// Bins that may be cleared in one cycle.
-const GROWTH: usize = 32;
+/// Bins emptied in one cycle, and the cycles that takes.
+const CLEAR_BINS: usize = 16;
+pub const CLEAR_SLICES: u32 = (BINS / CLEAR_BINS) as u32;
+
+/// Sums of one bin: samples, travel, torque.
+#[derive(Debug, Clone, Copy)]
+struct Bin {
+    n: f64,
+    travel: f64,
+    torque: f64,
+}
+
+const EMPTY: Bin = Bin { n: 0.0, travel: 0.0, torque: 0.0 };
 
 /// Torque against travel, as sums a bin.
 #[derive(Debug, Clone)]
 pub struct Curve {
     bins_per_mm: f64,
     used: usize,
-    count: [f64; BINS],
-    travel: [f64; BINS],
-    torque: [f64; BINS],
+    bins: [Bin; BINS],
 }
 
 impl Default for Curve {
     fn default() -> Curve {
-        Curve { bins_per_mm: 1.0, used: 0, count: [0.0; BINS], travel: [0.0; BINS], torque: [0.0; BINS] }
+        Curve { bins_per_mm: 1.0, used: 0, bins: [EMPTY; BINS] }
     }
 }
 
 impl Curve {
-    /// Starts a curve with bins of `width_mm`. Bins are cleared as they are reached, so this costs nothing.
+    /// Starts a curve with bins of `width_mm`; `clear` must empty the bins before samples come.
     pub fn start(&mut self, width_mm: f64) {
         self.bins_per_mm = 1.0 / width_mm;
         self.used = 0;
     }
 
+    /// Empties slice number `slice` of `CLEAR_SLICES`, so that one cycle's work stays bounded.
+    pub fn clear(&mut self, slice: u32) {
+        if let Some(bins) = self.bins.chunks_exact_mut(CLEAR_BINS).nth(slice as usize) {
+            bins.fill(EMPTY);
+        }
+    }
+
     /// Adds a sample. Travel behind the reversal or beyond the last bin is ignored.
     #[inline(always)]
     pub fn add(&mut self, travel: f64, torque: f64) {
-        let place = travel * self.bins_per_mm;
-        if !(0.0..BINS as f64).contains(&place) {
-            return;
-        }
-        // `place` is below BINS already; `min` lets the compiler see that no index can panic.
-        let bin = (place as usize).min(BINS - 1);
-        if bin >= self.used {
-            self.grow(bin + 1);
-            if bin >= self.used {
-                return; // an encoder that jumps further than `GROWTH` bins in a cycle; the next cycles catch up
+        // Adding 2^52 leaves the nearest whole number in the low bits, in two instructions where a checked
+        // conversion takes ten. What is negative, beyond or no number gives a place beyond the bins.
+        const WHOLE: f64 = 4_503_599_627_370_496.0;
+        let place = ((travel * self.bins_per_mm + WHOLE).to_bits() & 0xffff_ffff) as usize;
+        if let Some(bin) = self.bins.get_mut(place) {
+            bin.n += 1.0;
+            bin.travel += travel;
+            bin.torque += torque;
+            if place >= self.used {
+                self.used = place + 1;
             }
         }
-        self.count[bin] += 1.0;
-        self.travel[bin] += travel;
-        self.torque[bin] += torque;
-    }
-
-    /// Clears the bins up to `wanted`, at most `GROWTH` of them, so that one cycle's work stays bounded.
-    #[cold]
-    fn grow(&mut self, wanted: usize) {
-        let from = self.used.min(BINS);
-        let to = wanted.min(from + GROWTH).min(BINS);
-        self.count[from..to].fill(0.0);
-        self.travel[from..to].fill(0.0);
-        self.torque[from..to].fill(0.0);
-        self.used = to;
     }
 
     /// Number of bins reached.
@@ -76,15 +78,18 @@ impl Curve {
         1.0 / self.bins_per_mm
     }
 
+    /// Bins in a millimetre; bin i is centred at i ÷ this.
+    #[must_use]
+    pub fn bins_per_mm(&self) -> f64 {
+        self.bins_per_mm
+    }
+
     /// Samples, mean travel (mm) and mean torque of a bin; `None` when it is empty or not there.
     #[must_use]
     #[inline(always)]
     pub fn point(&self, bin: usize) -> Option<(f64, f64, f64)> {
-        if bin >= self.used.min(BINS) || self.count[bin] == 0.0 {
-            return None;
-        }
-        let n = self.count[bin];
-        Some((n, self.travel[bin] / n, self.torque[bin] / n))
+        let sums = self.bins.get(..self.used)?.get(bin)?;
+        (sums.n > 0.0).then(|| (sums.n, sums.travel / sums.n, sums.torque / sums.n))
     }
 }
 
@@ -147,16 +152,17 @@ mod tests {
     fn a_bin_holds_means_and_an_untouched_one_nothing() {
         let mut curve = Curve::default();
         curve.start(0.001);
-        curve.add(0.0104, 1.0);
-        curve.add(0.0106, 3.0);
+        curve.add(0.0099, 1.0);
+        curve.add(0.0101, 3.0);
         curve.add(-1.0, 9.0);
         curve.add(f64::NAN, 9.0);
         curve.add(99.0, 9.0);
         assert_eq!(curve.used(), 11);
         assert_eq!(curve.point(5), None);
         let (n, s, t) = curve.point(10).unwrap();
-        assert!((n, t) == (2.0, 2.0) && (s - 0.0105).abs() < 1e-15);
+        assert!((n, t) == (2.0, 2.0) && (s - 0.01).abs() < 1e-15);
         curve.start(0.001);
+        (0..CLEAR_SLICES).for_each(|slice| curve.clear(slice));
         curve.add(0.0125, 7.0);
         assert_eq!(curve.point(10), None, "a new curve forgets the old one");
     }

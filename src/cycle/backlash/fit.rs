@@ -77,9 +77,9 @@ const SHARES: [f64; 3] = [0.65, 0.5, 0.35];
 /// Grid points for each kink.
 const GRID: usize = 24;
 /// Trials in one slice of the search.
-const TRIALS: usize = 4;
+const TRIALS: usize = 2;
 /// Bins in one slice of a pass over the curve.
-const SLICE: usize = 16;
+const SLICE: usize = 8;
 /// Gauss–Newton steps.
 const STEPS: u32 = 16;
 /// First bins left out: the motor's friction turns its sign there.
@@ -104,10 +104,14 @@ enum Stage {
     Sum { bin: usize },
     /// Trial number `next` of the kink grid; ends with the grid.
     Search { next: usize },
-    /// Gauss–Newton; ends after `STEPS` or when a step brings nothing.
-    Refine { step: u32, damping: f64 },
+    /// Gauss–Newton: finds a step; ends after `STEPS`.
+    Refine { step: u32 },
+    /// Gauss–Newton: tries the step; ends after `STEPS`, or when a step brings nothing.
+    Try { step: u32, ds1: f64, ds2: f64 },
     /// Residuals against their neighbours; ends with the stretch.
     Residuals { bin: usize, last: f64, count: f64, squares: f64, differences: f64 },
+    /// Weighs the residuals; ends at once.
+    Judge { count: f64, squares: f64, differences: f64 },
     /// The result stands.
     Done,
 }
@@ -161,7 +165,9 @@ impl Fit {
         match self.stage {
             Stage::Sum { bin } => self.sum(curve, bin),
             Stage::Search { next } => self.search(curve, next),
-            Stage::Refine { step, damping } => self.refine(curve, step, damping),
+            Stage::Refine { step } => self.refine(curve, step),
+            Stage::Try { step, ds1, ds2 } => self.try_step(curve, step, ds1, ds2),
+            Stage::Judge { count, squares, differences } => self.stage = self.judge(curve, count, squares, differences),
             Stage::Residuals { bin, last, count, squares, differences } => {
                 self.residuals(curve, bin, last, count, squares, differences);
             }
@@ -179,7 +185,7 @@ impl Fit {
     /// Largest number of slices that a fit may take.
     #[must_use]
     pub const fn slices_bound() -> u32 {
-        let passes = 2 * (BINS / SLICE + 2) + GRID * GRID / TRIALS + 2 + STEPS as usize + 4;
+        let passes = 2 * (BINS / SLICE + 2) + GRID * GRID / TRIALS + 2 + 2 * STEPS as usize + 4;
         (passes * SHARES.len()) as u32
     }
 
@@ -238,9 +244,9 @@ impl Fit {
 
     /// The stretch before `s`, as a number of bins between `first` and `end`.
     fn bins_before(&self, curve: &Curve, s: f64) -> usize {
-        let bin = (s / curve.width_mm()).max(0.0) as usize;
+        let bin = (s * curve.bins_per_mm() + 0.5).max(0.0) as usize;
         let below = matches!(curve.point(bin), Some((_, mean, _)) if mean < s);
-        (bin + usize::from(below)).clamp(self.first, self.end)
+        (bin + usize::from(below)).max(self.first).min(self.end)
     }
 
     /// Sums before the first kink, after the second, and in all.
@@ -289,7 +295,7 @@ impl Fit {
         self.stage = if next < GRID * GRID {
             Stage::Search { next }
         } else if self.best.sse.is_finite() {
-            Stage::Refine { step: 0, damping: 1.0 }
+            Stage::Refine { step: 0 }
         } else {
             self.next_share(curve, self.share + 1)
         };
@@ -312,32 +318,37 @@ impl Fit {
         (matrix, right)
     }
 
-    fn refine(&mut self, curve: &Curve, step: u32, damping: f64) {
+    /// Where Gauss–Newton would put the kinks.
+    fn refine(&mut self, curve: &Curve, step: u32) {
         let t = self.best;
         let (matrix, right) = self.normal(curve, &t);
-        let mut next = Stage::Refine { step: step + 1, damping };
-        let moved = solve(matrix, right).map(|d| {
-            let largest = 0.1 * (self.end - self.first) as f64 * curve.width_mm();
-            let s1 = t.s1 + (damping * d[2]).clamp(-largest, largest);
-            let s2 = t.s2 + (damping * d[3]).clamp(-largest, largest);
-            let meet = 0.5 * (s1 + s2);
-            if s1 <= s2 { self.trial(curve, s1, s2) } else { self.trial(curve, meet, meet) }
-        });
-        match moved {
-            Some(trial) if trial.sse < t.sse => {
-                let gain = t.sse - trial.sse;
-                self.best = trial;
-                if gain < 1e-9 * t.sse {
-                    next = FIRST_RESIDUAL;
-                }
+        self.stage = match Cholesky::new(matrix) {
+            Some(system) if step < STEPS => {
+                let d = system.solve(right);
+                let largest = 0.1 * (self.end - self.first) as f64 * curve.width_mm();
+                let bounded = |way: f64| way.max(-largest).min(largest);
+                Stage::Try { step, ds1: bounded(d[2]), ds2: bounded(d[3]) }
             }
-            Some(_) if damping > 0.1 => next = Stage::Refine { step: step + 1, damping: 0.5 * damping },
-            _ => next = FIRST_RESIDUAL,
-        }
-        self.stage = match next {
-            Stage::Refine { step, .. } if step >= STEPS => FIRST_RESIDUAL,
-            Stage::Residuals { .. } | Stage::Refine { .. } => next,
             _ => FIRST_RESIDUAL,
+        };
+    }
+
+    /// Takes the step if it makes the fit better, else half of it, and so on.
+    fn try_step(&mut self, curve: &Curve, step: u32, ds1: f64, ds2: f64) {
+        let t = self.best;
+        let (s1, s2) = (t.s1 + ds1, t.s2 + ds2);
+        let meet = 0.5 * (s1 + s2);
+        let trial = if s1 <= s2 { self.trial(curve, s1, s2) } else { self.trial(curve, meet, meet) };
+        let gain = t.sse - trial.sse;
+        if gain > 0.0 {
+            self.best = trial;
+        }
+        self.stage = if gain > 1e-9 * t.sse {
+            Stage::Refine { step: step + 1 }
+        } else if gain < 0.0 && step + 1 < STEPS {
+            Stage::Try { step: step + 1, ds1: 0.5 * ds1, ds2: 0.5 * ds2 }
+        } else {
+            FIRST_RESIDUAL
         };
     }
 
@@ -362,7 +373,7 @@ impl Fit {
         self.stage = if to < self.end {
             Stage::Residuals { bin: to, last, count, squares, differences }
         } else {
-            self.judge(curve, count, squares, differences)
+            Stage::Judge { count, squares, differences }
         };
     }
 
@@ -405,9 +416,9 @@ impl Fit {
         let scale = noise * inflation;
         // d(lost motion)/d(c, k, s1, s2); the levels come from other samples.
         let gradient = [0.0, -change / (t.k * t.k), -1.0, 1.0];
-        let weights = solve(matrix, gradient)?;
-        let fit_variance = scale * weights.iter().zip(gradient).map(|(w, g)| w * g).sum::<f64>();
-        let k_variance = scale * solve(matrix, [0.0, 1.0, 0.0, 0.0])?[1];
+        let system = Cholesky::new(matrix)?;
+        let fit_variance = scale * system.inverse_form(gradient);
+        let k_variance = scale * system.inverse_form([0.0, 1.0, 0.0, 0.0]);
         let windup = change / t.k;
         let clearance = t.s2 - t.s1;
         let variance = fit_variance + self.levels.variance / (t.k * t.k);
@@ -429,32 +440,55 @@ impl Fit {
 
 const FIRST_RESIDUAL: Stage = Stage::Residuals { bin: 0, last: 0.0, count: 0.0, squares: 0.0, differences: 0.0 };
 
-/// Solves a symmetric positive definite system of four by Cholesky; `None` when it is singular.
-fn solve(matrix: [[f64; 4]; 4], right: [f64; 4]) -> Option<[f64; 4]> {
-    const SINGULAR: f64 = 1e-10;
-    let mut l = [[0.0; 4]; 4];
-    for i in 0..4 {
-        for j in 0..=i {
-            let dot: f64 = (0..j).map(|m| l[i][m] * l[j][m]).sum();
-            let rest = matrix[i][j] - dot;
-            if i == j {
-                if rest <= SINGULAR * matrix[i][i] {
-                    return None;
+/// A symmetric positive definite system of four, factored.
+struct Cholesky([[f64; 4]; 4]);
+
+impl Cholesky {
+    /// Factors the matrix; `None` when it is singular.
+    fn new(matrix: [[f64; 4]; 4]) -> Option<Cholesky> {
+        const SINGULAR: f64 = 1e-10;
+        let mut l = [[0.0; 4]; 4];
+        for i in 0..4 {
+            for j in 0..=i {
+                let dot: f64 = (0..j).map(|m| l[i][m] * l[j][m]).sum();
+                let rest = matrix[i][j] - dot;
+                if i == j {
+                    if rest <= SINGULAR * matrix[i][i] {
+                        return None;
+                    }
+                    l[i][i] = rest.sqrt();
+                } else {
+                    l[i][j] = rest / l[j][j];
                 }
-                l[i][i] = rest.sqrt();
-            } else {
-                l[i][j] = rest / l[j][j];
             }
         }
+        Some(Cholesky(l))
     }
-    let mut y = right;
-    for i in 0..4 {
-        let dot: f64 = (0..i).map(|m| l[i][m] * y[m]).sum();
-        y[i] = (y[i] - dot) / l[i][i];
+
+    /// L⁻¹·right.
+    fn forward(&self, right: [f64; 4]) -> [f64; 4] {
+        let l = &self.0;
+        let mut y = right;
+        for i in 0..4 {
+            let dot: f64 = (0..i).map(|m| l[i][m] * y[m]).sum();
+            y[i] = (y[i] - dot) / l[i][i];
+        }
+        y
     }
-    for i in (0..4).rev() {
-        let dot: f64 = (i + 1..4).map(|m| l[m][i] * y[m]).sum();
-        y[i] = (y[i] - dot) / l[i][i];
+
+    /// g·A⁻¹·g, the variance of a sum weighted with g, as |L⁻¹·g|².
+    fn inverse_form(&self, g: [f64; 4]) -> f64 {
+        self.forward(g).iter().map(|y| y * y).sum()
     }
-    Some(y)
+
+    /// A⁻¹·right.
+    fn solve(&self, right: [f64; 4]) -> [f64; 4] {
+        let l = &self.0;
+        let mut y = self.forward(right);
+        for i in (0..4).rev() {
+            let dot: f64 = (i + 1..4).map(|m| l[m][i] * y[m]).sum();
+            y[i] = (y[i] - dot) / l[i][i];
+        }
+        y
+    }
 }

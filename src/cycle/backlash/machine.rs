@@ -10,7 +10,7 @@
 //! state is entered; when it runs out the machine leaves. In Failed the restoring request stays on the output, so
 //! that a kernel which comes back late still sees it.
 
-use super::curve::{Curve, Moments};
+use super::curve::Curve;
 use super::fit::{Fit, Levels};
 use super::io::*;
 use super::peak::Peak;
@@ -21,6 +21,10 @@ use crate::cycle::profile::Profile;
 use crate::error::*;
 
 mod measure;
+mod quick;
+mod readings;
+
+use readings::{Probe, Watch};
 
 /// Where the machine is. Each comment says what ends the state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,6 +55,8 @@ enum Phase {
     EvaluatePeak { bin: usize },
     /// Ends when the fit stands.
     EvaluateFit,
+    /// Ends with its cycle: the reversal is judged, and the next one or the end follows.
+    Conclude,
     /// Ends when the kernel confirms the amount asked for and reversal acceleration back.
     Write { then: After },
     /// Ends when the commanded speed is 0.
@@ -81,29 +87,6 @@ pub enum Wish {
     Enable,
 }
 
-/// Reading of the scan while it runs: the smoothed torque as a share of sliding, −1 before, +1 after.
-#[derive(Debug, Clone, Copy, Default)]
-struct Watch {
-    middle: f64,
-    per_half: f64,
-    smooth: f64,
-    gain: f64,
-    margin: f64,
-    highest: f64,
-    highest_at: f64,
-    high_at: f64,
-}
-
-/// Torque against way back from `turn`, both ways, over the middle of the probe's depth.
-#[derive(Debug, Clone, Copy, Default)]
-struct Probe {
-    turn: f64,
-    depth: f64,
-    deepest: f64,
-    back: Moments,
-    forth: Moments,
-}
-
 /// A lost-motion measurement of one axis: plain data, no pointers.
 #[derive(Debug, Clone)]
 pub struct Backlash {
@@ -119,6 +102,8 @@ pub struct Backlash {
     hold: u32,
     /// Number of the present reversal, from 0.
     reversal: u32,
+    /// Which of the two senses it belongs to.
+    index: usize,
     references: [f64; 2],
     /// Sense of the scan, ±1.
     sense: f64,
@@ -162,6 +147,7 @@ impl Default for Backlash {
             left: 0,
             hold: 0,
             reversal: 0,
+            index: 0,
             references: [0.0; 2],
             sense: 1.0,
             turn: 0.0,
@@ -294,14 +280,33 @@ impl Backlash {
         Some((0..curve.used()).filter_map(move |bin| curve.point(bin).map(|(_, s, t)| (s * 1e3, t * nm))))
     }
 
+    /// True when nothing is under way: no measurement, no wish, no restore owed. A step may then be answered with
+    /// `rest_at` alone.
+    #[must_use]
+    pub fn quiet(&self) -> bool {
+        !self.busy() && self.wish.is_none() && !self.changed
+    }
+
+    /// A cycle in which nothing is under way: the axis stays where it is (mm, finite).
+    #[inline(always)]
+    pub fn rest_at(&mut self, position_mm: f64) -> &BacklashOutput {
+        self.output.target_position_mm = position_mm;
+        &self.output
+    }
+
     /// One servo cycle.
-    #[inline]
     pub fn step(&mut self, input: &BacklashInput) -> &BacklashOutput {
-        if matches!(self.phase, Phase::Idle | Phase::Done | Phase::Failed) {
-            self.rest(input);
+        if !self.busy() {
+            if input.position_mm.is_finite() {
+                self.output.target_position_mm = input.position_mm;
+            }
+            if !self.quiet() {
+                self.between(input);
+            }
             return &self.output;
         }
-        if let Some(fault) = self.danger(input) {
+        let danger = if self.safe(input) || self.regardless() { None } else { self.danger(input) };
+        if let Some(fault) = danger {
             self.leave(fault);
         } else if self.left == 0 {
             self.overdue();
@@ -309,23 +314,34 @@ impl Backlash {
             self.left -= 1;
             self.advance(input);
         }
-        self.output.target_position_mm = self.profile.position;
-        self.output.target_speed_mm_s = self.profile.speed * self.plan.cycles_per_s;
-        self.output.remaining_mm = (self.profile.goal - self.profile.position).abs();
+        self.put_out();
         &self.output
     }
 
-    /// Idle, Done, Failed: follows the axis, carries out wishes, and waits for a restore that is still owed.
-    #[inline(always)]
-    fn rest(&mut self, input: &BacklashInput) {
-        if input.position_mm.is_finite() {
-            self.output.target_position_mm = input.position_mm;
-        }
-        if self.wish.is_some() || self.changed {
-            self.between(input);
-        }
+    /// Braking, restoring and what an operator asked for go on whatever the axis does.
+    fn regardless(&self) -> bool {
+        matches!(self.phase, Phase::Stopping | Phase::Restore | Phase::Write { then: After::Idle })
     }
 
+    #[inline(always)]
+    fn put_out(&mut self) {
+        self.output.target_position_mm = self.profile.position;
+        self.output.target_speed_mm_s = self.profile.speed * self.plan.cycles_per_s;
+        self.output.remaining_mm = self.profile.left().abs();
+    }
+
+    /// Whether this cycle's input allows the measurement to go on. An axis that follows its command within the lag
+    /// limit is within its travel too, see [`Plan::check_reach`].
+    #[inline(always)]
+    fn safe(&self, input: &BacklashInput) -> bool {
+        // Comparisons with NaN are false, and `x - x` is NaN for what is not finite.
+        let lag = self.profile.position - input.position_mm;
+        input.flags == 0
+            && input.torque.abs() <= self.plan.torque_bound
+            && lag.abs() + (input.compensation_um - input.compensation_um) <= self.plan.lag_limit
+    }
+
+    /// Between measurements: carries out wishes, and waits for a restore that is still owed.
     #[cold]
     fn between(&mut self, input: &BacklashInput) {
         if self.changed {
@@ -353,25 +369,8 @@ impl Backlash {
         self.enter(Phase::Write { then: After::Idle }, f64::from(self.plan.ack_timeout));
     }
 
-    /// Anything in this cycle's input that must end a measurement. Braking and restoring go on regardless.
-    #[inline(always)]
+    /// What in this cycle's input must end a measurement.
     fn danger(&self, input: &BacklashInput) -> Option<Fault> {
-        let plan = &self.plan;
-        let position = input.position_mm;
-        let safe = input.flags == 0
-            && input.torque.abs() <= plan.torque_bound
-            && position >= plan.travel[0]
-            && position <= plan.travel[1]
-            && (self.profile.position - position).abs() <= plan.lag_limit
-            && input.compensation_um.is_finite();
-        if safe || matches!(self.phase, Phase::Stopping | Phase::Restore | Phase::Write { then: After::Idle }) {
-            return None;
-        }
-        self.name_danger(input)
-    }
-
-    #[cold]
-    fn name_danger(&self, input: &BacklashInput) -> Option<Fault> {
         let plan = &self.plan;
         let fault = |code, field, value, low, high| Some(Fault { code, field, value, low, high });
         let finite = |field, value: f64| fault(GIB_ERR_NON_FINITE, field, value, f64::MIN, f64::MAX);
@@ -397,10 +396,11 @@ impl Backlash {
             let position = input.position_mm;
             return fault(GIB_ERR_TRAVEL_BOUND, "position_mm\0", position, plan.travel[0], plan.travel[1]);
         }
-        if self.phase == Phase::Begin {
-            return None; // no command was given yet, so nothing can lag
-        }
         let lag = self.profile.position - input.position_mm;
+        // Before the first command nothing can lag.
+        if self.phase == Phase::Begin || lag.abs() <= plan.lag_limit {
+            return None;
+        }
         fault(GIB_ERR_LAG, "position_mm\0", lag, -plan.lag_limit, plan.lag_limit)
     }
 
@@ -437,9 +437,7 @@ impl Backlash {
 
     /// Second half of the door: asks for the old amount if anything was changed.
     fn restore(&mut self) {
-        self.profile.stop();
-        self.profile.speed = 0.0;
-        self.profile.goal = self.profile.position;
+        self.profile.halt();
         if self.changed {
             self.request(self.fallback_um, false);
             self.enter(Phase::Restore, f64::from(self.plan.ack_timeout));
@@ -487,7 +485,7 @@ impl Backlash {
             Phase::Settle => GIB_BACKLASH_SETTLE,
             Phase::Scan => GIB_BACKLASH_SCAN,
             Phase::Unwind { .. } | Phase::ProbeBack | Phase::ProbeForth => GIB_BACKLASH_PROBE,
-            Phase::EvaluatePeak { .. } | Phase::EvaluateFit => GIB_BACKLASH_EVALUATE,
+            Phase::EvaluatePeak { .. } | Phase::EvaluateFit | Phase::Conclude => GIB_BACKLASH_EVALUATE,
             Phase::Write { .. } => GIB_BACKLASH_WRITE,
             Phase::Stopping => GIB_BACKLASH_STOPPING,
             Phase::Restore => GIB_BACKLASH_RESTORE,

@@ -1,7 +1,7 @@
 //! The configuration of a measurement, checked once and turned into the constants of a cycle.
 
 use super::config::BacklashConfig;
-use super::curve::BINS;
+use super::curve::{BINS, CLEAR_SLICES};
 use crate::error::{Fault, in_range};
 
 /// A validated configuration with every constant of a cycle derived. Lengths in mm, time in cycles, torque in the
@@ -159,7 +159,7 @@ impl Plan {
             step: step_um * 1e-3,
             bin: limit / (BINS - 1) as f64,
             dwell: cycles(in_range("dwell_s\0", or(c.dwell_s, 0.02f64.max(2.0 * cycle)), 2.0 * cycle, 1.0)?),
-            settle: cycles(in_range("settle_s\0", or(c.settle_s, 0.2), cycle, 10.0)?),
+            settle: cycles(in_range("settle_s\0", or(c.settle_s, 0.2), cycle, 10.0)?).max(CLEAR_SLICES + 1),
             feed: in_range("feed_mm_s\0", or(c.feed_mm_s, 0.1), 0.001, 5.0)? * cycle,
             approach_speed: approach * cycle,
             slide_speed: slide_speed * cycle,
@@ -207,8 +207,9 @@ impl Plan {
     /// # Errors
     /// `GIB_ERR_CONFIG` naming the reference and where it may be.
     pub fn check_reach(&self, references: [f64; 2]) -> Result<(), Fault> {
-        // A reversal at r after motion in sense a uses the way from r − a·run_in to r, and the scan goes back.
-        let (before, past) = (self.run_in().max(self.reach()), self.limit.min(self.lag_limit));
+        // A reversal at r after motion in sense a uses the way from r − a·run_in to r, and the scan goes back. With
+        // the following error beyond it, no axis that follows its command can leave the travel allowed.
+        let (before, past) = (self.run_in().max(self.reach()) + self.lag_limit, self.lag_limit);
         for (i, field) in ["reference_1_mm\0", "reference_2_mm\0"].into_iter().enumerate().take(self.senses as usize) {
             let sense = if i == 0 { self.first_sense } else { -self.first_sense };
             let (low, high) = if sense > 0.0 { (before, past) } else { (past, before) };

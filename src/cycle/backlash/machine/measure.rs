@@ -1,68 +1,14 @@
 //! The measuring states: what happens in a cycle of each, and what comes after it.
 
+use super::readings::RISE_LOW;
 use super::*;
 use crate::cycle::backlash::{curve, verdict};
 
-/// Share of sliding at which the wind-up has certainly begun, and one further up: their distance scales the probe.
-const RISE_LOW: f64 = 0.5;
-const RISE_HIGH: f64 = 0.65;
-/// Points of the curve, and share of the way, without growth after which the table is sliding.
-const STALL_POINTS: f64 = 15.0;
-const STALL_SHARE: f64 = 0.4;
-
 /// Bins that the peak rule sees in one cycle.
-const PEAK_SLICE: usize = 16;
-
-impl Watch {
-    /// Begins a scan between the sliding levels; `noise` is the standard deviation of one sample, `gain` the share
-    /// of a new sample in the smoothed one.
-    fn new(before: f64, after: f64, noise: f64, gain: f64) -> Watch {
-        let per_half = 2.0 / (after - before);
-        Watch {
-            middle: 0.5 * (before + after),
-            per_half,
-            smooth: -1.0,
-            gain,
-            // White noise of std σ has σ·√(gain/2) left after the smoothing; twice that is growth, not chance.
-            margin: 2.0 * noise * per_half * (0.5 * gain).sqrt(),
-            highest: -1.0,
-            ..Watch::default()
-        }
-    }
-
-    #[inline(always)]
-    fn add(&mut self, travel: f64, torque: f64) {
-        self.smooth += self.gain * ((torque - self.middle) * self.per_half - self.smooth);
-        if self.smooth > self.highest + self.margin {
-            self.highest = self.smooth;
-            self.highest_at = travel;
-            if self.high_at == 0.0 && self.smooth > RISE_HIGH {
-                self.high_at = travel;
-            }
-        }
-    }
-}
-
-impl Probe {
-    /// Twice the motor's friction and its variance: the distance of two parallel lines, torque against way, one for
-    /// each sense. Parallel, since the drive's stiffness is the same both ways; lines, since the motor does not
-    /// pass all places equally fast.
-    fn difference(&self) -> (f64, f64) {
-        let (b, f) = (&self.back, &self.forth);
-        let spread = |m: &Moments| m.ss - m.s * m.s / m.n;
-        let with_way = |m: &Moments| m.st - m.s * m.t / m.n;
-        let slope = (with_way(b) + with_way(f)) / (spread(b) + spread(f));
-        let apart = f.s / f.n - b.s / b.n;
-        let twice = f.t / f.n - b.t / b.n - slope * apart;
-        let rest = |m: &Moments| m.tt - m.t * m.t / m.n - slope * with_way(m);
-        let noise = (rest(b) + rest(f)).max(0.0) / (b.n + f.n - 3.0);
-        (twice, noise * (1.0 / b.n + 1.0 / f.n + apart * apart / (spread(b) + spread(f))))
-    }
-}
+const PEAK_SLICE: usize = 8;
 
 impl Backlash {
     /// One cycle of the present state.
-    #[inline(always)]
     pub(super) fn advance(&mut self, input: &BacklashInput) {
         match self.phase {
             Phase::Scan => self.scan(input),
@@ -78,17 +24,14 @@ impl Backlash {
                     self.slide_back();
                 }
             }
-            Phase::Settle => {
-                if self.left == 1 {
-                    self.turn(input);
-                }
-            }
+            Phase::Settle => self.settle(input),
             Phase::EvaluatePeak { bin } => self.evaluate_peak(bin),
             Phase::EvaluateFit => {
-                if self.fit.advance(&self.curves[self.sense_index()]) {
-                    self.conclude();
+                if self.fit.advance(&self.curves[self.index & 1]) {
+                    self.enter(Phase::Conclude, 1.0);
                 }
             }
+            Phase::Conclude => self.conclude(),
             Phase::Begin => self.begin(input),
             Phase::Clear => {
                 if self.confirmed(input) {
@@ -115,11 +58,6 @@ impl Backlash {
         }
     }
 
-    /// Which of the two senses the present reversal belongs to.
-    fn sense_index(&self) -> usize {
-        usize::from(self.plan.senses == 2 && self.reversal % 2 == 1)
-    }
-
     fn begin(&mut self, input: &BacklashInput) {
         self.profile = Profile::at_rest(input.position_mm, self.plan.acceleration);
         self.fallback_um = input.compensation_um;
@@ -133,10 +71,11 @@ impl Backlash {
 
     /// To the reference position of the next reversal.
     fn next_reversal(&mut self) {
-        let index = self.sense_index();
+        let index = usize::from(self.plan.senses == 2 && self.reversal % 2 == 1);
+        self.index = index;
         let before = if index == 0 { self.plan.first_sense } else { -self.plan.first_sense };
         self.sense = -before;
-        let goal = self.references[index];
+        let goal = self.references[index & 1];
         self.move_to(Phase::Approach, goal, self.plan.approach_speed);
     }
 
@@ -150,26 +89,57 @@ impl Backlash {
     fn slide_back(&mut self) {
         self.after = Level::new(self.plan.batch);
         self.before = Level::new(self.plan.batch);
-        let goal = self.references[self.sense_index()] + self.sense * self.plan.run_in();
+        let goal = self.references[self.index & 1] + self.sense * self.plan.run_in();
         self.move_to(Phase::SlideBack, goal, self.plan.slide_speed);
     }
 
     /// Slides at constant speed; the last stretch before braking is the sliding level.
-    #[inline(always)]
     fn slide(&mut self, input: &BacklashInput) {
         let arrived = self.profile.step();
-        let left = (self.profile.goal - self.profile.position).abs();
-        if left <= self.plan.level_from && self.profile.speed.abs() >= self.plan.slide_speed {
+        self.read_level(input);
+        if arrived {
+            self.end_slide();
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn read_level(&mut self, input: &BacklashInput) {
+        if self.profile.left().abs() <= self.plan.level_from && self.profile.speed.abs() >= self.plan.slide_speed {
             let torque = self.sense * input.torque;
             if self.phase == Phase::SlideBack { self.after.add(torque) } else { self.before.add(torque) }
         }
-        if arrived {
-            if self.phase == Phase::SlideBack {
-                let goal = self.references[self.sense_index()];
-                self.move_to(Phase::SlideIn, goal, self.plan.slide_speed);
-            } else {
-                self.enter(Phase::Settle, f64::from(self.plan.settle) + 1.0);
-            }
+    }
+
+    #[cold]
+    fn end_slide(&mut self) {
+        if self.phase == Phase::SlideBack {
+            let goal = self.references[self.index & 1];
+            self.move_to(Phase::SlideIn, goal, self.plan.slide_speed);
+        } else {
+            let bin = self.plan.bin;
+            self.curve_mut().start(bin);
+            self.enter(Phase::Settle, f64::from(self.plan.settle));
+        }
+    }
+
+    /// At rest the position dithers by the encoder's grid, if at all.
+    fn settle(&mut self, input: &BacklashInput) {
+        self.see_change(input);
+        // The curve is emptied while there is time.
+        let slice = self.left;
+        self.curve_mut().clear(slice);
+        if self.left == 1 {
+            self.turn(input);
+        }
+    }
+
+    /// Keeps the smallest change of position seen between two cycles: the encoder's grid, once the axis creeps.
+    #[inline(always)]
+    pub(super) fn see_change(&mut self, input: &BacklashInput) {
+        let change = (input.position_mm - self.last_position).abs();
+        self.last_position = input.position_mm;
+        if change > 0.0 && change < self.smallest_change {
+            self.smallest_change = change;
         }
     }
 
@@ -199,12 +169,10 @@ impl Backlash {
         }
         let samples = f64::from(self.after.batches().max(1)) * f64::from(self.plan.batch);
         let noise = (self.after.variance_of_mean() * samples).sqrt();
-        self.watch = Watch::new(self.before.mean(), self.after.mean(), noise, self.plan.watch_gain);
+        self.watch = Watch::new(self.before.mean(), self.after.mean(), noise, self.plan.watch_gain, self.plan.limit);
         self.turn = input.position_mm;
         self.turn_command = self.profile.position;
         self.hold = self.plan.dwell;
-        let index = self.sense_index();
-        self.curves[index].start(self.plan.bin);
         if self.plan.slow_feed {
             let goal = self.turn_command + self.sense * (self.plan.limit + self.plan.lag_limit);
             self.move_to(Phase::Scan, goal, self.plan.feed);
@@ -215,15 +183,7 @@ impl Backlash {
     }
 
     /// One cycle of stepping or feeding away from the reversal.
-    #[inline(always)]
     fn scan(&mut self, input: &BacklashInput) {
-        let travel = self.sense * (input.position_mm - self.turn);
-        let torque = self.sense * input.torque;
-        let change = (input.position_mm - self.last_position).abs();
-        self.last_position = input.position_mm;
-        if change > 0.0 && change < self.smallest_change {
-            self.smallest_change = change;
-        }
         let mut over = false;
         if self.plan.slow_feed {
             over = self.profile.step();
@@ -238,25 +198,41 @@ impl Backlash {
                 return;
             }
         }
-        self.curves[usize::from(self.plan.senses == 2) & (self.reversal & 1) as usize].add(travel, torque);
-        self.watch.add(travel, torque);
-        let stalled = (STALL_POINTS * self.plan.step).max(STALL_SHARE * self.watch.highest_at);
-        if self.watch.highest > RISE_LOW && travel > self.watch.highest_at + stalled {
-            self.probe_back(input);
-        } else if over || travel >= self.plan.limit {
-            let code = if self.watch.highest < RISE_LOW { GIB_ERR_BACKLASH_NO_RISE } else { GIB_ERR_BACKLASH_LIMIT };
-            let found = self.watch.highest;
-            self.leave(Fault { code, field: "detection_limit_um\0", value: found, low: RISE_LOW, high: 1.0 });
+        let travel = self.sense * (input.position_mm - self.turn);
+        let torque = self.sense * input.torque;
+        self.curve_mut().add(travel, torque);
+        self.watch.add(travel, torque, &self.plan);
+        if over || travel >= self.watch.end {
+            self.end_scan(input, travel);
         }
+    }
+
+    /// The curve of the present sense.
+    #[inline(always)]
+    pub(super) fn curve_mut(&mut self) -> &mut Curve {
+        let [first, second] = &mut self.curves;
+        if self.index == 0 { first } else { second }
+    }
+
+    /// The table slides, or the limit is reached before it did.
+    #[cold]
+    fn end_scan(&mut self, input: &BacklashInput, travel: f64) {
+        if self.watch.highest > RISE_LOW && travel < self.plan.limit {
+            return self.probe_back(input);
+        }
+        let found = self.watch.highest;
+        let code = if found > RISE_LOW { GIB_ERR_BACKLASH_LIMIT } else { GIB_ERR_BACKLASH_NO_RISE };
+        self.leave(Fault { code, field: "detection_limit_um\0", value: found, low: RISE_LOW, high: 1.0 });
     }
 
     /// Sliding is reached: will go back by a share of the way, where the table still sticks.
     #[cold]
     fn probe_back(&mut self, input: &BacklashInput) {
-        let high_at = if self.watch.high_at > 0.0 { self.watch.high_at } else { self.watch.highest_at };
+        let reached = self.sense * (input.position_mm - self.turn);
+        let high_at = if self.watch.high_at > 0.0 { self.watch.high_at } else { reached };
         // A quarter of the way so far ends in the wind-up or in the clearance, where the table sticks.
         let depth = (0.25 * high_at).max(2.0 * self.plan.step);
-        self.probe = Probe { depth, deepest: high_at, ..Probe::default() };
+        self.probe = Probe::new(depth, high_at);
         self.unwind(input, false);
     }
 
@@ -291,45 +267,35 @@ impl Backlash {
     }
 
     /// One cycle of the probe. Friction on the motor's side is half the difference of the torque both ways at the
-    /// same place; the first and last quarter of the way, where the motor turns, are left out.
-    #[inline(always)]
+    /// same place.
     fn probe(&mut self, input: &BacklashInput) {
         let over = self.profile.step();
+        self.see_change(input);
+        let forth = self.phase == Phase::ProbeForth;
         let back = self.sense * (self.probe.turn - input.position_mm);
-        let depth = self.probe.depth;
-        let inside = back > 0.25 * depth && back < 0.75 * depth;
-        let torque = self.sense * input.torque;
-        if self.phase == Phase::ProbeBack {
-            if inside {
-                self.probe.back = self.probe.back.with(1.0, back, torque);
-            }
-            if back >= depth {
-                return self.unwind(input, true);
-            }
-        } else {
-            if inside {
-                self.probe.forth = self.probe.forth.with(1.0, back, torque);
-            }
-            if back <= 0.1 * depth {
-                return self.probed();
-            }
+        self.probe.add(back, forth, self.sense * input.torque);
+        let ended = self.probe.ended(back, forth);
+        if ended || over {
+            self.end_probe(input, back, over && !ended);
         }
+    }
+
+    #[cold]
+    fn end_probe(&mut self, input: &BacklashInput, back: f64, over: bool) {
         if over {
-            self.leave(Fault {
-                code: GIB_ERR_BACKLASH_MOTOR_FRICTION,
-                field: "position_mm\0",
-                value: back,
-                low: 0.0,
-                high: depth,
-            });
+            let (field, high) = ("position_mm\0", self.probe.depth);
+            self.leave(Fault { code: GIB_ERR_BACKLASH_MOTOR_FRICTION, field, value: back, low: 0.0, high });
+        } else if self.phase == Phase::ProbeBack {
+            self.unwind(input, true);
+        } else {
+            self.probed();
         }
     }
 
     /// All of one reversal is recorded.
     #[cold]
     fn probed(&mut self) {
-        self.profile.goal = self.profile.position;
-        self.profile.speed = 0.0;
+        self.profile.halt();
         let (twice, twice_variance) = self.probe.difference();
         let change = self.after.mean() - self.before.mean();
         let motor = (0.5 * twice).max(0.0);
@@ -358,7 +324,7 @@ impl Backlash {
     }
 
     fn evaluate_peak(&mut self, bin: usize) {
-        let curve = &self.curves[self.sense_index()];
+        let curve = &self.curves[self.index & 1];
         for bin in bin..bin + PEAK_SLICE {
             if let Some((n, travel, torque)) = curve.point(bin) {
                 self.peak.add(n, travel, torque);
@@ -375,13 +341,13 @@ impl Backlash {
     /// One reversal is evaluated: next one, or the end.
     #[cold]
     fn conclude(&mut self) {
-        let index = self.sense_index();
+        let index = self.index;
         let fitted = match verdict::check_reversal(self.fit.result()) {
             Ok(fitted) => fitted,
             Err(fault) => return self.leave(fault),
         };
         let steps = self.curves[index].used() as f64 * self.plan.bin / self.plan.step;
-        self.senses[index].add(&fitted, &self.levels, self.peak.found(), steps);
+        self.senses[index & 1].add(&fitted, &self.levels, self.peak.found(), steps);
         self.reversal += 1;
         let all = self.plan.senses * self.plan.repeats;
         self.output.progress_ratio = f64::from(self.reversal) / f64::from(all);

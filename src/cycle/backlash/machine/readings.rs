@@ -1,0 +1,121 @@
+//! What is read while the axis moves: the torque of the scan as it grows, and the probe of the motor's friction.
+
+use crate::cycle::backlash::curve::Moments;
+use crate::cycle::backlash::plan::Plan;
+
+/// Share of sliding at which the wind-up has certainly begun, and one further up: their distance scales the probe.
+pub(super) const RISE_LOW: f64 = 0.5;
+const RISE_HIGH: f64 = 0.65;
+/// Growth of the smoothed torque, as a share of sliding, that is worth a look.
+const LEAST_NEWS: f64 = 0.03;
+/// Points of the curve, and share of the way, without growth after which the table is sliding.
+const STALL_POINTS: f64 = 15.0;
+const STALL_SHARE: f64 = 0.4;
+
+/// Reading of the scan while it runs: the smoothed torque as a share of sliding, −1 before, +1 after.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Watch {
+    pub(super) middle: f64,
+    pub(super) per_half: f64,
+    pub(super) smooth: f64,
+    pub(super) gain: f64,
+    /// Growth beyond this is news: the highest reading so far and what chance may add.
+    pub(super) news: f64,
+    pub(super) margin: f64,
+    pub(super) highest: f64,
+    /// Travel at which the reading passed `RISE_HIGH`; 0 before.
+    pub(super) high_at: f64,
+    /// Travel at which the scan ends unless there is news.
+    pub(super) end: f64,
+}
+
+/// Torque against way back from `turn`, both ways, over the middle of the probe's depth.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Probe {
+    pub(super) turn: f64,
+    pub(super) depth: f64,
+    /// Where the way forth ends, and between which places torques count, mm back from `turn`.
+    pub(super) near: f64,
+    pub(super) from: f64,
+    pub(super) to: f64,
+    pub(super) deepest: f64,
+    pub(super) back: Moments,
+    pub(super) forth: Moments,
+}
+
+impl Watch {
+    /// Begins a scan between the sliding levels that ends at `limit` (mm). `noise` is the standard deviation of one
+    /// sample, `gain` the share of a new sample in the smoothed one.
+    pub(super) fn new(before: f64, after: f64, noise: f64, gain: f64, limit: f64) -> Watch {
+        let per_half = 2.0 / (after - before);
+        // White noise of std σ has σ·√(gain/2) left after the smoothing; twice that is growth, not chance.
+        let margin = LEAST_NEWS + 2.0 * noise * per_half * (0.5 * gain).sqrt();
+        let middle = 0.5 * (before + after);
+        Watch { middle, per_half, smooth: -1.0, gain, news: -1.0, margin, highest: -1.0, high_at: 0.0, end: limit }
+    }
+
+    /// The smoothed torque once this sample is in.
+    #[inline(always)]
+    pub(super) fn next(&self, torque: f64) -> f64 {
+        self.smooth + self.gain * ((torque - self.middle) * self.per_half - self.smooth)
+    }
+
+    /// Adds a sample.
+    pub(super) fn add(&mut self, travel: f64, torque: f64, plan: &Plan) {
+        self.smooth = self.next(torque);
+        if self.smooth > self.news {
+            self.grow(travel, plan);
+        }
+    }
+
+    /// The reading has grown: the scan goes on for as long as growth may be hidden by noise or by a clearance.
+    fn grow(&mut self, travel: f64, plan: &Plan) {
+        self.highest = self.smooth;
+        self.news = self.smooth + self.margin;
+        if self.high_at == 0.0 && self.smooth > RISE_HIGH {
+            self.high_at = travel;
+        }
+        if self.smooth > RISE_LOW {
+            let stall = (STALL_POINTS * plan.step).max(STALL_SHARE * travel);
+            self.end = plan.limit.min(travel + stall);
+        }
+    }
+}
+
+impl Probe {
+    /// Begins a probe that goes back by `depth` mm and must not go further than `deepest`, where the table slips.
+    pub(super) fn new(depth: f64, deepest: f64) -> Probe {
+        let (near, from, to) = (0.1 * depth, 0.25 * depth, 0.75 * depth);
+        Probe { depth, near, from, to, deepest, ..Probe::default() }
+    }
+
+    /// Whether the way has ended: back at its depth, or forth before the place where it turned.
+    #[inline(always)]
+    pub(super) fn ended(&self, back: f64, forth: bool) -> bool {
+        if forth { back <= self.near } else { back >= self.depth }
+    }
+
+    /// Adds a torque, `back` mm from the turn. The first and last quarter, where the motor turns, are left out.
+    #[inline(always)]
+    pub(super) fn add(&mut self, back: f64, forth: bool, torque: f64) {
+        if back > self.from && back < self.to {
+            let way = if forth { &mut self.forth } else { &mut self.back };
+            *way = way.with(1.0, back, torque);
+        }
+    }
+
+    /// Twice the motor's friction and its variance: the distance of two parallel lines, torque against way, one for
+    /// each sense. Parallel, since the drive's stiffness is the same both ways; lines, since the motor does not
+    /// pass all places equally fast.
+    pub(super) fn difference(&self) -> (f64, f64) {
+        let (b, f) = (&self.back, &self.forth);
+        let spread = |m: &Moments| m.ss - m.s * m.s / m.n;
+        let with_way = |m: &Moments| m.st - m.s * m.t / m.n;
+        let slope = (with_way(b) + with_way(f)) / (spread(b) + spread(f));
+        let apart = f.s / f.n - b.s / b.n;
+        let twice = f.t / f.n - b.t / b.n - slope * apart;
+        let rest = |m: &Moments| m.tt - m.t * m.t / m.n - slope * with_way(m);
+        let noise = (rest(b) + rest(f)).max(0.0) / (b.n + f.n - 3.0);
+        (twice, noise * (1.0 / b.n + 1.0 / f.n + apart * apart / (spread(b) + spread(f))))
+    }
+}
