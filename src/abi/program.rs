@@ -34,9 +34,8 @@ pub struct GibProgram {
 }
 
 impl super::guard::Instance for GibProgram {
-    const ALIVE: u64 = ALIVE;
-    fn alive(&self) -> u64 {
-        self.alive
+    fn alive(&self) -> bool {
+        self.alive == ALIVE
     }
     fn new() -> GibProgram {
         GibProgram { alive: ALIVE, last: Fault::NONE, text: [0; GIB_PROGRAM_TEXT_SIZE] }

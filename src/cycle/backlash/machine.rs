@@ -411,8 +411,8 @@ impl Backlash {
             Phase::Restore => self.give_up(),
             Phase::Stopping => self.restore(),
             Phase::Clear | Phase::Write { .. } => {
-                let (value, low) = (f64::from(self.output.request_id), f64::from(self.output.request_id));
-                self.leave(Fault { code: GIB_ERR_ACK_TIMEOUT, field: "acknowledged_id\0", value, low, high: low });
+                let low = f64::from(self.output.request_id);
+                self.leave(Fault { code: GIB_ERR_ACK_TIMEOUT, field: "acknowledged_id\0", value: low, low, high: low });
             }
             _ => self.leave(Fault { code: GIB_ERR_DEADLINE, field: "phase\0", ..Fault::NONE }),
         }
