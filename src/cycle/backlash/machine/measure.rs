@@ -125,8 +125,8 @@ impl Backlash {
     /// At rest the position dithers by the encoder's grid, if at all.
     fn settle(&mut self, input: &BacklashInput) {
         self.see_change(input);
-        // The curve is emptied while there is time.
-        let slice = self.left;
+        // The curve is emptied while there is time: the last slices in the last cycles, the first one in the last.
+        let slice = self.left.saturating_sub(1);
         self.curve_mut().clear(slice);
         if self.left == 1 {
             self.turn(input);
