@@ -168,9 +168,8 @@ pub unsafe extern "C" fn gib_backlash_step(
     }
     // SAFETY: as above, and none is NULL.
     let (handle, input, output) = unsafe { (&mut *handle, &*input, &mut *output) };
-    // The cheap cycle, in which an axis spends its life. `x - x` is NaN for NaN and infinity.
-    let not_finite = input.position_mm - input.position_mm;
-    if handle.alive == QUIET && !not_finite.is_nan() {
+    // The cheap cycle, in which an axis spends its life. `x * 0` is NaN for NaN and infinity.
+    if handle.alive == QUIET && !(input.position_mm * 0.0).is_nan() {
         *output = *handle.machine.rest_at(input.position_mm);
         return handle.machine.output().status;
     }

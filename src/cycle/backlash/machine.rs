@@ -20,6 +20,7 @@ use crate::cycle::level::Level;
 use crate::cycle::profile::Profile;
 use crate::error::*;
 
+mod door;
 mod measure;
 mod quick;
 mod readings;
@@ -334,11 +335,11 @@ impl Backlash {
     /// limit is within its travel too, see [`Plan::check_reach`].
     #[inline(always)]
     fn safe(&self, input: &BacklashInput) -> bool {
-        // Comparisons with NaN are false, and `x - x` is NaN for what is not finite.
+        // Comparisons with NaN are false, and `x * 0` is NaN for what is not finite.
         let lag = self.profile.position - input.position_mm;
         input.flags == 0
             && input.torque.abs() <= self.plan.torque_bound
-            && lag.abs() + (input.compensation_um - input.compensation_um) <= self.plan.lag_limit
+            && lag.abs() + input.compensation_um * 0.0 <= self.plan.lag_limit
     }
 
     /// Between measurements: carries out wishes, and waits for a restore that is still owed.
@@ -402,59 +403,6 @@ impl Backlash {
             return None;
         }
         fault(GIB_ERR_LAG, "position_mm\0", lag, -plan.lag_limit, plan.lag_limit)
-    }
-
-    /// A deadline has passed.
-    #[cold]
-    fn overdue(&mut self) {
-        match self.phase {
-            Phase::Restore => self.give_up(),
-            Phase::Stopping => self.restore(),
-            Phase::Clear | Phase::Write { .. } => {
-                let low = f64::from(self.output.request_id);
-                self.leave(Fault { code: GIB_ERR_ACK_TIMEOUT, field: "acknowledged_id\0", value: low, low, high: low });
-            }
-            _ => self.leave(Fault { code: GIB_ERR_DEADLINE, field: "phase\0", ..Fault::NONE }),
-        }
-    }
-
-    /// The one door out of a measurement: keeps the first fault, brakes, restores, fails.
-    #[cold]
-    fn leave(&mut self, fault: Fault) {
-        if matches!(self.phase, Phase::Stopping | Phase::Restore) {
-            return; // on the way out already
-        }
-        self.fault = fault;
-        self.output.message = fault.code;
-        if self.profile.speed != 0.0 && fault.code != GIB_ERR_DRIVE_FAULT {
-            self.profile.stop();
-            let bound = self.profile.cycles_bound();
-            self.enter(Phase::Stopping, bound);
-        } else {
-            self.restore();
-        }
-    }
-
-    /// Second half of the door: asks for the old amount if anything was changed.
-    fn restore(&mut self) {
-        self.profile.halt();
-        if self.changed {
-            self.request(self.fallback_um, false);
-            self.enter(Phase::Restore, f64::from(self.plan.ack_timeout));
-        } else {
-            self.fail();
-        }
-    }
-
-    /// The restore was not confirmed in time. The request stays on the output.
-    fn give_up(&mut self) {
-        self.fail();
-        self.output.message = GIB_ERR_RESTORE_UNCONFIRMED;
-    }
-
-    fn fail(&mut self) {
-        self.enter(Phase::Failed, 0.0);
-        self.output.status = self.fault.code;
     }
 
     /// Asks the kernel for a compensation amount and for reversal acceleration off, or as configured.

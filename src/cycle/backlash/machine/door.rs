@@ -1,0 +1,58 @@
+//! The one door out of a measurement: brake, restore what was changed, fail with the first error.
+
+use super::*;
+
+impl Backlash {
+    /// A deadline has passed.
+    #[cold]
+    pub(super) fn overdue(&mut self) {
+        match self.phase {
+            Phase::Restore => self.give_up(),
+            Phase::Stopping => self.restore(),
+            Phase::Clear | Phase::Write { .. } => {
+                let low = f64::from(self.output.request_id);
+                self.leave(Fault { code: GIB_ERR_ACK_TIMEOUT, field: "acknowledged_id\0", value: low, low, high: low });
+            }
+            _ => self.leave(Fault { code: GIB_ERR_DEADLINE, field: "phase\0", ..Fault::NONE }),
+        }
+    }
+
+    /// The one door out of a measurement: keeps the first fault, brakes, restores, fails.
+    #[cold]
+    pub(super) fn leave(&mut self, fault: Fault) {
+        if matches!(self.phase, Phase::Stopping | Phase::Restore) {
+            return; // on the way out already
+        }
+        self.fault = fault;
+        self.output.message = fault.code;
+        if self.profile.speed != 0.0 && fault.code != GIB_ERR_DRIVE_FAULT {
+            self.profile.stop();
+            let bound = self.profile.cycles_bound();
+            self.enter(Phase::Stopping, bound);
+        } else {
+            self.restore();
+        }
+    }
+
+    /// Second half of the door: asks for the old amount if anything was changed.
+    pub(super) fn restore(&mut self) {
+        self.profile.halt();
+        if self.changed {
+            self.request(self.fallback_um, false);
+            self.enter(Phase::Restore, f64::from(self.plan.ack_timeout));
+        } else {
+            self.fail();
+        }
+    }
+
+    /// The restore was not confirmed in time. The request stays on the output.
+    pub(super) fn give_up(&mut self) {
+        self.fail();
+        self.output.message = GIB_ERR_RESTORE_UNCONFIRMED;
+    }
+
+    pub(super) fn fail(&mut self) {
+        self.enter(Phase::Failed, 0.0);
+        self.output.status = self.fault.code;
+    }
+}
