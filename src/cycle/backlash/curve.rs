@@ -7,8 +7,9 @@
 /// Bins a curve can hold; a longer scan takes wider bins.
 pub const BINS: usize = 1024;
 
-/// Bins emptied in one cycle, and the cycles that takes.
+/// Bins emptied in one cycle.
 const CLEAR_BINS: usize = 16;
+/// Slices of `Curve::clear`.
 pub const CLEAR_SLICES: u32 = (BINS / CLEAR_BINS) as u32;
 
 /// Sums of one bin: samples, travel, torque.
