@@ -188,6 +188,14 @@ impl Effect {
         Coupling { stiffness, damping, clearance, inertia_share: share, friction_share: self.form[1] }
     }
 
+    /// How late the torque column is, s. Where the current loop is much faster than the cycle the torque stands still for
+    /// most of it, and a part of a cycle leaves no trace: only whole cycles are hidden there.
+    fn delay(&self, rig: &Rig) -> f64 {
+        let period = rig.servo.period;
+        let whole = rig.servo.lag < 0.4 * period;
+        self.sign * if whole { (self.amount / period).round().max(1.0) * period } else { self.amount }
+    }
+
     /// Puts the effect into the true machine.
     pub fn apply(&self, rig: &Rig, truth: &mut Truth) {
         let (size, form) = (self.sign * self.amount, &self.form);
@@ -209,7 +217,7 @@ impl Effect {
             "cable_force" => truth.cable = (size, form[0]),
             "quadratic_drag" => truth.drag = size,
             "thermal_drift" => truth.drift = (size, form[0]),
-            "dead_time" => truth.delay = size,
+            "dead_time" => truth.delay = self.delay(rig),
             "external_vibration" => {
                 truth.vibration = Sine { amplitude: self.amount, period: 1.0 / form[0], phase: form[1] }
             }
@@ -263,7 +271,7 @@ impl Effect {
             "cable_force" => vec![scored("slope_nm_mm", size), extra("zero_mm", form[0])],
             "quadratic_drag" => vec![scored("drag_nm_s2_m2", size)],
             "thermal_drift" => vec![scored("drop_nm", size), scored("time_constant_s", form[0])],
-            "dead_time" => vec![scored("delay_ms", size * 1e3)],
+            "dead_time" => vec![scored("delay_ms", self.delay(rig) * 1e3)],
             "external_vibration" => vec![scored("frequency_hz", form[0]), scored("amplitude_nm", self.amount)],
             "torque_saturation" => vec![scored("limit_nm", form[1] - self.amount), extra("slope_ratio", form[0])],
             "screw_pitch_error" => vec![scored("scale_um_m", size * 1e6)],
