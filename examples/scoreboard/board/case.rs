@@ -317,7 +317,8 @@ impl Case {
         std::fs::write(&files.truth_machine, pretty(&self.rig.machine_file("rig", entries.clone())))?;
         let truth = json!({ "hidden": format!("{:?}", self.kind), "effects": entries, "sizes": self.sizes,
             "closed_loop_difference": self.difference, "torque_noise": self.rig.torque_noise,
-            "torque_floor": self.rig.torque_floor(), "encoder_step": self.rig.encoder_step, "draws": self.draws });
+            "torque_floor": self.rig.torque_floor(), "encoder_step": self.rig.encoder_step, "draws": self.draws,
+            "forms": self.effects.iter().map(|e| e.form).collect::<Vec<_>>() });
         std::fs::write(at("truth.json"), pretty(&truth))?;
         Ok(files)
     }

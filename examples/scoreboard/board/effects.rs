@@ -43,7 +43,7 @@ pub struct Effect {
     /// About how its trace grows with the amount: trace ∝ amount^power.
     pub power: f64,
     pub sign: f64,
-    form: [f64; 3],
+    pub form: [f64; 3],
 }
 
 /// One parameter as the files have it.
@@ -100,7 +100,7 @@ impl Effect {
                 (0.1 * tc, 0.6 * tc, 1.0)
             }
             "presliding_friction" => {
-                form[0] = if r.chance(0.5) { 0.0 } else { r.uniform(0.05, 0.5) };
+                form[0] = if r.chance(0.6) { 0.0 } else { r.uniform(0.05, 0.4) };
                 (1e-3, 0.15, 0.5)
             }
             "backlash" => {

@@ -7,7 +7,8 @@
 //! the sliding legs are integrated by the classical Runge–Kutta method of fourth order, and a mass whose speed changes
 //! sign is caught at rest, from where it breaks away only when the rest of the forces exceeds the friction at rest.
 //! With presliding it is Dahl's law solved in closed form over the displacement of a step, f = s·F − (s·F − f₀)·e^(−σ|Δq|/F),
-//! σ = Tc/d, with LuGre's bristle damping σ₁·ż. The current loop's first-order lag is exact.
+//! σ = Tc/d, with LuGre's bristle damping σ₁·ż (Canudas de Wit et al. 1995), σ₁ fading with speed. The current loop's
+//! first-order lag is exact.
 
 use super::truth::{Coupling, Truth};
 
@@ -106,7 +107,9 @@ impl<'a> Machine<'a> {
         let s = if way == 0.0 { w.signum() } else { way.signum() };
         let level = self.truth.dry(t, q, w, s);
         let f = self.stretched(start.bristle[i], way, s, level);
-        f + self.bristle_damping * w * (1.0 - w.signum() * f / level)
+        // Constant damping would make a fast reversal harder than the friction itself: it fades above a fifth of it.
+        let fade = (-(self.bristle_damping * w / (0.2 * self.truth.coulomb)).powi(2)).exp();
+        f + self.bristle_damping * fade * w * (1.0 - w.signum() * f / level)
     }
 
     /// Dahl's friction `f` after a further displacement `way` in direction `s`, sliding at `level`.
