@@ -122,9 +122,8 @@ fn text(d: &Diagnosis) -> String {
         for other in &finding.indistinguishable_from {
             let _ = writeln!(text, "   this recording cannot tell it from {other}");
         }
-        if let Some(experiment) = &finding.next_experiment {
-            let why = experiment.get("why").and_then(|w| w.as_str()).unwrap_or_default();
-            let _ = writeln!(text, "   next: {why}");
+        if let Some((_, why)) = &finding.next_experiment {
+            let _ = writeln!(text, "   next: {why} (the moves are in the JSON)");
         }
     }
     if !d.gains.is_empty() {

@@ -103,16 +103,17 @@ fn lines(bench: &Bench, rest: &[f64]) -> f64 {
     (best - 2.0 * n.ln() / n).clamp(0.0, 1.0)
 }
 
-/// The move list that would tell two causes apart, within the stroke and speed of the recording, and why.
+/// The move list (`gib.moves/1`) that would tell two causes apart, within the stroke and speed of the recording, and why.
 #[must_use]
-pub fn telling(frame: &Frame, a: Cause, b: Cause) -> Value {
+pub fn telling(frame: &Frame, a: Cause, b: Cause) -> (Value, String) {
     use Cause::*;
     let (low, high) = frame.stroke();
     let stroke = high - low;
     let top = frame.top_speed();
+    let brisk = 0.7 * frame.acceleration.iter().fold(1e-3, |m: f64, a| m.max(a.abs())) / frame.unit;
     let middle = 0.5 * (low + high);
     let round = |x: f64| (x * 1000.0).round() / 1000.0;
-    let go = |to: f64, speed: f64| json!({ "to_mm": round(to), "speed_mm_s": round(speed) });
+    let go = |to: f64, speed: f64| json!({ "to_mm": round(to), "speed_mm_s": round(speed.max(1e-3)), "acceleration_mm_s2": round(brisk) });
     let is = |x: Cause| a == x || b == x;
     let (why, moves): (String, Vec<Value>) = if is(Cogging) || is(ExternalVibration) {
         let speeds = [0.1, 0.17, 0.31].map(|s| s * top);
@@ -145,5 +146,7 @@ pub fn telling(frame: &Frame, a: Cause, b: Cause) -> Value {
         let speeds = [0.01, 0.03, 0.1, 0.3, 1.0].map(|s| s * top);
         (why.into(), speeds.iter().flat_map(|&s| [go(high, s), go(low, s)]).collect())
     };
-    json!({ "why": why, "moves": moves })
+    let moves = json!({ "schema": crate::plant::moves::SCHEMA, "axis": frame.axis.name, "start_mm": round(low),
+        "moves": moves });
+    (moves, why)
 }

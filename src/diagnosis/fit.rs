@@ -6,6 +6,7 @@
 
 use super::causes::{Law, Rest, Scale, Term, Trace};
 use super::frame::Frame;
+use std::sync::Arc;
 
 /// A recording as one system of equations.
 #[derive(Debug)]
@@ -29,8 +30,9 @@ pub struct Part {
     pub law: &'static Law,
     /// Non-linear parameters.
     pub shape: Vec<f64>,
-    fixed: Option<Vec<f64>>,
-    columns: Vec<Vec<f64>>,
+    // Shared: sets of causes are copied often, their columns never change.
+    fixed: Option<Arc<[f64]>>,
+    columns: Arc<[Vec<f64>]>,
 }
 
 /// A fitted set of causes.
@@ -82,7 +84,7 @@ impl<'f, 'a> Bench<'f, 'a> {
     pub fn part(&self, law: &'static Law, shape: Vec<f64>) -> Part {
         let Term { fixed, regressors } = (law.term)(self.frame, &shape);
         let columns = regressors.iter().map(|trace| self.stack(trace)).collect();
-        Part { law, shape, fixed: fixed.map(|trace| self.stack(&trace)), columns }
+        Part { law, shape, fixed: fixed.map(|trace| self.stack(&trace).into()), columns }
     }
 
     /// What is left, channel by channel, in their own units; rows of the torque by their weight.
@@ -106,13 +108,13 @@ impl<'f, 'a> Bench<'f, 'a> {
         let mut residual = self.measured.clone();
         for part in &parts {
             if let Some(fixed) = &part.fixed {
-                residual.iter_mut().zip(fixed).for_each(|(r, f)| *r -= f);
+                residual.iter_mut().zip(fixed.iter()).for_each(|(r, f)| *r -= f);
             }
         }
         let free = basis.len();
         // R of the decomposition, for the coefficients.
         let mut triangle: Vec<Vec<f64>> = Vec::new();
-        for column in parts.iter().flat_map(|part| &part.columns) {
+        for column in parts.iter().flat_map(|part| part.columns.iter()) {
             let (direction, weights) = orthonormal(column, &basis);
             basis.push(direction);
             triangle.push(weights);
@@ -152,7 +154,7 @@ impl<'f, 'a> Bench<'f, 'a> {
             let fixed = clear(fixed, &[]);
             residual.iter_mut().zip(fixed).for_each(|(r, f)| *r -= f);
         }
-        for column in &part.columns {
+        for column in part.columns.iter() {
             let mut c = clear(column, &own);
             let length = dot(&c, &c);
             if length > 1e-9 * dot(column, column) {
@@ -239,7 +241,7 @@ impl<'f, 'a> Bench<'f, 'a> {
                     add(up, per);
                     add(down, -per);
                 }
-                for ((up, down), c) in up.columns.iter().zip(&down.columns).zip(&fit.coefficients[i]) {
+                for ((up, down), c) in up.columns.iter().zip(down.columns.iter()).zip(&fit.coefficients[i]) {
                     add(up, c * per);
                     add(down, -c * per);
                 }
@@ -333,7 +335,7 @@ impl Fit {
     #[must_use]
     pub fn contribution(&self, part: usize) -> Vec<f64> {
         let p = &self.parts[part];
-        let mut sum = p.fixed.clone().unwrap_or_else(|| vec![0.0; self.residual.len()]);
+        let mut sum = p.fixed.as_ref().map_or_else(|| vec![0.0; self.residual.len()], |f| f.to_vec());
         for (column, c) in p.columns.iter().zip(&self.coefficients[part]) {
             sum.iter_mut().zip(column).for_each(|(s, v)| *s += c * v);
         }

@@ -35,7 +35,8 @@ impl Diagnosis {
                 let ties: Vec<&str> = f.indistinguishable_from.iter().map(|c| c.name()).collect();
                 json!({ "cause": f.effect.cause().name(), "confidence": f.confidence, "share": f.share,
                     "parameters": parameters, "evidence": f.evidence, "indistinguishable_from": ties,
-                    "next_experiment": f.next_experiment })
+                    "next_experiment": f.next_experiment.as_ref().map(|(moves, _)| moves),
+                    "next_experiment_reason": f.next_experiment.as_ref().map(|(_, why)| why) })
             })
             .collect();
         let gain: Map<String, Value> = self

@@ -21,6 +21,8 @@ const LEAST_ROWS: usize = 300;
 const TOLERABLE_EXCESS: f64 = 0.6;
 /// Share of the excess that named causes must remove together.
 const LEAST_EXPLAINED: f64 = 0.8;
+/// The same for lost motion: rigid flanks that meet without rebound place a clearance well, but not each impact.
+const LEAST_EXPLAINED_LOST_MOTION: f64 = 0.4;
 /// Excess (in variance) that may be left for everything to count as explained.
 const LITTLE_LEFT: f64 = 0.5;
 
@@ -54,8 +56,8 @@ pub struct Finding {
     pub evidence: String,
     /// Causes that this recording cannot tell from it.
     pub indistinguishable_from: Vec<Cause>,
-    /// Moves that would tell.
-    pub next_experiment: Option<serde_json::Value>,
+    /// Moves (`gib.moves/1`) that would tell, and why.
+    pub next_experiment: Option<(serde_json::Value, String)>,
 }
 
 /// What is left.
@@ -118,9 +120,11 @@ pub fn diagnose(
     let before = Excess::of(&bench, &empty, &selection.fit);
     let after = Excess::of(&bench, &selection.fit, &selection.fit);
     let explained = before.explained_by(&after);
+    let lost_motion = selection.fit.parts.iter().any(|p| p.law.cause == Cause::Backlash);
+    let least = if lost_motion { LEAST_EXPLAINED_LOST_MOTION } else { LEAST_EXPLAINED };
     let (verdict, fit) = if selection.fit.parts.is_empty() {
         (if before.largest() > TOLERABLE_EXCESS { Verdict::UnknownCause } else { Verdict::NoDiscrepancy }, &empty)
-    } else if before.largest() > TOLERABLE_EXCESS && explained < LEAST_EXPLAINED {
+    } else if before.largest() > TOLERABLE_EXCESS && explained < least {
         (Verdict::UnknownCause, &empty)
     } else if after.largest() > LITTLE_LEFT {
         (Verdict::PartlyExplained, &selection.fit)
@@ -134,7 +138,7 @@ pub fn diagnose(
     if !watch(0.95) {
         return Err(Stopped);
     }
-    let gains = gains(axis, &extended, recording, holdout, &bench, &empty, fit);
+    let gains = gains(axis, &extended, holdout, &bench, &empty, fit);
     let shown = experiment::lives_in(&bench, &empty);
     let lives_in = experiment::lives_in(&bench, fit);
     let [rest, _] = bench.rest(fit);

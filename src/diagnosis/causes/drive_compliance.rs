@@ -1,7 +1,7 @@
 //! Elastic drive: motor and table are two masses on a spring, with the resonance ω² = k·(1/J₁ + 1/J₂). Seen from the motor,
 //! the table's inertia weighs more towards the antiresonance √(k/J₂) and less above it; at a reversal the drive winds up.
 
-use super::table_side::{self, Shares};
+use super::table_side;
 use super::*;
 use std::f64::consts::TAU;
 
@@ -17,11 +17,11 @@ pub static LAW: Law = Law {
     starts: |frame, _| {
         let most = (0.25 / frame.columns.period_s).min(300.0);
         let frequencies = log_spaced(10.0, most.max(20.0), 14);
-        frequencies.flat_map(|f| [vec![f, 0.25, 0.7, 0.04], vec![f, 0.42, 0.7, 0.04]]).collect()
+        frequencies.map(|f| vec![f, 0.33, 0.7, 0.04]).collect()
     },
     starts_from_rest: false,
     term: |frame, shape| match effect(frame, shape) {
-        Some(effect) => table_side::term(frame, effect, Shares { width: false }),
+        Some(effect) => table_side::term(frame, effect),
         None => Term::default(),
     },
     effect: |frame, shape, _| effect(frame, shape),

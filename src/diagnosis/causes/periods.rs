@@ -6,14 +6,17 @@ use std::f64::consts::TAU;
 
 /// Bins along the stroke: eight to the shortest period looked for.
 const STROKE_BINS: usize = 1 << 14;
-/// Starts handed on.
-const MOST: usize = 4;
+/// Starts handed on from each octave.
+const MOST: usize = 2;
 
 /// Sine and cosine with this many periods over the stroke, every row.
 pub fn waves(frame: &Frame, periods: f64) -> (Vec<f64>, Vec<f64>) {
     let (low, high) = frame.stroke();
     let k = TAU * periods / (high - low);
-    frame.x.iter().map(|x| (k * (x - low)).sin_cos()).unzip()
+    // Faster than nearly half a period a row the wave would alias, at a steady speed into a constant.
+    let fastest = 0.45 * TAU / (k * frame.columns.period_s);
+    let at = |(x, v): (&f64, &f64)| if v.abs() > fastest { (0.0, 0.0) } else { (k * (x - low)).sin_cos() };
+    frame.x.iter().zip(&frame.v).map(at).unzip()
 }
 
 /// Numbers of periods over the stroke at which the rest repeats most, and those that the drive suggests.
@@ -31,13 +34,13 @@ pub fn along_stroke(frame: &Frame, rest: &[f64]) -> Vec<Vec<f64>> {
         }
     }
     // Two transform lengths over the stroke: half periods are resolved. Periods below eight bins or eight encoder steps,
-    // and fewer than three over the stroke, are not looked for.
+    // and fewer than five over the stroke, are not looked for.
     let most = (STROKE_BINS / 8).min((stroke / (8.0 * frame.grid.max(1e-9))) as usize);
-    let mut starts = peaks(&mut bins, 6, 2 * most, 0.5);
+    let mut starts = peaks(&mut bins, 10, 2 * most, 0.5);
     if let crate::machine::Drive::BallScrew { lead_mm } = frame.axis.drive {
         let poles = f64::from(frame.axis.motor_pole_pairs.unwrap_or(4));
         let likely = [1.0, 2.0, poles, 2.0 * poles, 6.0 * poles].map(|n| n * stroke / lead_mm);
-        starts.extend(likely.into_iter().filter(|n| *n >= 3.0 && *n < most as f64).map(|n| vec![n]));
+        starts.extend(likely.into_iter().filter(|n| *n >= 1.5 && *n < most as f64).map(|n| vec![n]));
     }
     starts
 }
@@ -62,7 +65,7 @@ pub fn along_time(frame: &Frame, rest: &[f64]) -> Vec<Vec<f64>> {
     peaks(&mut bins, (10.0 / cycles) as usize, most, cycles)
 }
 
-/// The largest local peaks of the power spectrum between two bins, as multiples of `unit`.
+/// The largest local peaks of the power spectrum in each octave between two bins, as multiples of `unit`.
 fn peaks(values: &mut [f64], from: usize, to: usize, unit: f64) -> Vec<Vec<f64>> {
     let fft = RealFftPlanner::<f64>::new().plan_fft_forward(values.len());
     let mut spectrum = fft.make_output_vec();
@@ -71,11 +74,18 @@ fn peaks(values: &mut [f64], from: usize, to: usize, unit: f64) -> Vec<Vec<f64>>
     }
     let power: Vec<f64> = spectrum.iter().map(|c| c.norm_sqr()).collect();
     let to = to.min(power.len().saturating_sub(1));
-    let mut found: Vec<usize> =
-        (from.max(1)..to).filter(|&i| power[i] > power[i - 1] && power[i] >= power[i + 1]).collect();
-    found.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
-    found.truncate(MOST);
-    found.into_iter().map(|i| vec![i as f64 * unit]).collect()
+    // By octaves: what is left of slower causes stands high at long periods and must not hide a fine ripple.
+    let mut starts = Vec::new();
+    let mut low = from.max(1);
+    while low < to {
+        let high = (2 * low).min(to);
+        let mut found: Vec<usize> =
+            (low..high).filter(|&i| power[i] > power[i - 1] && power[i] >= power[i + 1]).collect();
+        found.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
+        starts.extend(found.into_iter().take(MOST).map(|i| vec![i as f64 * unit]));
+        low = high;
+    }
+    starts
 }
 
 /// Where a ripple of this period comes from.

@@ -1,20 +1,13 @@
-//! The table behind a clearance or a spring, driven by the measured motion of the motor.
+//! The table behind a spring, driven by the measured motion of the motor.
 //!
-//! J₂·ẍ₂ = c − φ·(Tc·sign(ẋ₂) + Tv·ẋ₂) − T0, with c = k·dz(x₁ − x₂) + d·(ẋ₁ − ẋ₂) in contact; the motor then needs
+//! J₂·ẍ₂ = c − φ·(Tc·sign(ẋ₂) + Tv·ẋ₂) − T0, with c = k·(x₁ − x₂) + d·(ẋ₁ − ẋ₂); the motor then needs
 //! T = J₁·ẍ₁ + (1 − φ)·(Tc·sign(ẋ₁) + Tv·ẋ₁) + c. Integrated by Moreau's time stepping: friction is the impulse that
 //! brings the table towards rest, at most φ·Tc·h, so that a table at rest stays there without chatter.
 
 use super::*;
 
-/// What the flanks are like.
-#[derive(Debug, Clone, Copy)]
-pub struct Shares {
-    /// Flanks of a clearance push only; a spring pulls as well.
-    pub width: bool,
-}
-
 /// The trace in the torque (against the rigid axis) and in table − encoder.
-pub fn term(frame: &Frame, effect: Effect, shares: Shares) -> Term {
+pub fn term(frame: &Frame, effect: Effect) -> Term {
     let axis = frame.axis.with_effects(vec![effect]);
     let Ok(Some(split)) = axis.two_masses() else { return Term::default() };
     let b = &frame.belief;
@@ -24,16 +17,7 @@ pub fn term(frame: &Frame, effect: Effect, shares: Shares) -> Term {
     let fastest = (split.stiffness / split.table_inertia).sqrt().max(split.damping / split.table_inertia);
     let steps = ((h * fastest / 0.5).ceil() as usize).clamp(2, 64);
     let dt = h / steps as f64;
-    let half = 0.5 * split.clearance;
-    let contact = |twist: f64, rate: f64| {
-        let beyond = twist.abs() - half;
-        if beyond <= 0.0 && half > 0.0 {
-            return 0.0;
-        }
-        let side = twist.signum();
-        let push = split.stiffness * beyond + side * split.damping * rate;
-        side * if shares.width { push.max(0.0) } else { push }
-    };
+    let contact = |twist: f64, rate: f64| split.stiffness * twist + split.damping * rate;
     let position = &frame.columns.position;
     let mut extra = vec![0.0; position.len()];
     let mut twist_of = vec![0.0; position.len()];

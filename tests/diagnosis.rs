@@ -1,0 +1,185 @@
+//! The diagnosis on motions and torques written down as formulas (no simulation, no code of the product), and on measured
+//! data where they are at hand.
+
+use gib::diagnosis::{Diagnosis, Stopped, Verdict, diagnose};
+use gib::machine::{Axis, Cause, Machine};
+use gib::recording::{Column, Recording};
+use std::f64::consts::TAU;
+use std::path::PathBuf;
+
+const MACHINE: &str = r#"{"schema":"gib.machine/1","name":"t","axes":[{"name":"x","drive":"ball_screw","lead_mm":10,
+  "motor_pole_pairs":4,"inertia_kg_m2":0.003,"coulomb_friction_nm":0.9,"viscous_friction_nm_s":0.008,
+  "constant_torque_nm":0.1}]}"#;
+
+fn axis() -> Axis {
+    Machine::parse(MACHINE).unwrap().axes.remove(0)
+}
+
+/// Uniform noise of unit variance; the seed is the argument.
+fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 12f64.sqrt()
+    }
+}
+
+/// 30 s at 1 kHz: two sines of incommensurate periods, 0.1 µm grid, torque noise 0.03 N·m. `extra` adds to the believed
+/// torque: of time (s), position (mm), speed (mm/s), acceleration (mm/s²).
+fn recording(extra: impl Fn(f64, f64, f64, f64) -> f64) -> Recording {
+    let (w1, w2) = (TAU * 0.21, TAU * 0.57);
+    let unit = TAU / 10.0;
+    let mut noise = noise(11);
+    let mut columns = [Vec::new(), Vec::new(), Vec::new()];
+    for i in 0..30_000 {
+        let t = f64::from(i) * 1e-3;
+        let x = 100.0 + 60.0 * (w1 * t).sin() + 12.0 * (w2 * t).sin();
+        let v = 60.0 * w1 * (w1 * t).cos() + 12.0 * w2 * (w2 * t).cos();
+        let a = -60.0 * w1 * w1 * (w1 * t).sin() - 12.0 * w2 * w2 * (w2 * t).sin();
+        let believed = 0.003 * a * unit + 0.008 * v * unit + 0.9 * v.signum() + 0.1;
+        columns[0].push(t);
+        columns[1].push((x * 1e4).round() / 1e4);
+        columns[2].push(believed + extra(t, x, v, a) + 0.03 * noise());
+    }
+    let [time, x, torque] = columns;
+    Recording::from_columns("test", time, vec![Column::new("x.position_mm", x), Column::new("x.torque_nm", torque)])
+        .unwrap()
+}
+
+fn judged(recording: &Recording) -> Diagnosis {
+    diagnose(&axis(), recording, None, &|_| true).unwrap()
+}
+
+/// The cause is named alone, and each parameter is within `tolerance` of the truth, relative.
+fn finds(cause: Cause, truth: &[f64], tolerance: f64, recording: &Recording) {
+    let d = judged(recording);
+    let named: Vec<Cause> = d.findings.iter().map(|f| f.effect.cause()).collect();
+    assert_eq!(named, [cause], "{d:?}");
+    for (found, truth) in d.findings[0].effect.values().iter().zip(truth) {
+        assert!((found / truth - 1.0).abs() < tolerance, "{cause}: {found} for {truth}");
+    }
+    // The gain is real and not better than noise allows.
+    let gain = &d.gains[0];
+    assert!(gain.after < gain.before && gain.after > 0.2 * d.unexplained.noise_rms, "{gain:?}");
+}
+
+#[test]
+fn a_machine_as_believed_is_left_alone() {
+    let d = judged(&recording(|_, _, _, _| 0.0));
+    assert_eq!(d.verdict, Verdict::NoDiscrepancy, "{d:?}");
+    assert!(d.findings.is_empty() && d.extended == axis());
+}
+
+#[test]
+fn each_law_is_found_under_its_own_name() {
+    let unit = TAU / 10.0;
+    finds(Cause::InertiaMismatch, &[0.0036], 0.05, &recording(|_, _, _, a| 0.0006 * a * unit));
+    finds(Cause::CoulombFrictionMismatch, &[1.0], 0.02, &recording(|_, _, v, _| 0.1 * v.signum()));
+    finds(Cause::ViscousFrictionMismatch, &[0.010], 0.03, &recording(|_, _, v, _| 0.002 * v * unit));
+    finds(Cause::ConstantTorque, &[0.2], 0.02, &recording(|_, _, _, _| 0.1));
+    finds(Cause::DirectionDependentFriction, &[0.002], 0.05, &recording(|_, _, v, _| 0.002 * (v * unit).abs()));
+    finds(
+        Cause::StribeckFriction,
+        &[0.2, 8.0],
+        0.08,
+        &recording(|_, _, v, _| 0.2 * v.signum() * (-(v / 8.0).powi(2)).exp()),
+    );
+    finds(Cause::Cogging, &[0.06, 2.5], 0.05, &recording(|_, x, _, _| 0.06 * (TAU * x / 2.5 + 0.7).sin()));
+    finds(Cause::CableForce, &[0.003], 0.03, &recording(|_, x, _, _| 0.003 * x));
+    finds(Cause::ExternalVibration, &[17.3, 0.06], 0.05, &recording(|t, _, _, _| 0.06 * (TAU * 17.3 * t + 1.0).sin()));
+    finds(Cause::ThermalDrift, &[0.3, 7.0], 0.1, &recording(|t, _, v, _| 0.3 * (-t / 7.0).exp() * v.signum()));
+    finds(
+        Cause::PositionDependentFriction,
+        &[120.0, 0.2, 9.0],
+        0.1,
+        &recording(|_, x, v, _| 0.2 * v.signum() * (-((x - 120.0) / 9.0).powi(2)).exp()),
+    );
+}
+
+#[test]
+fn two_at_once_are_both_found() {
+    let d = judged(&recording(|_, x, v, _| 0.1 * v.signum() + 0.06 * (TAU * x / 2.5).sin()));
+    let mut named: Vec<Cause> = d.findings.iter().map(|f| f.effect.cause()).collect();
+    named.sort();
+    assert_eq!(named, [Cause::CoulombFrictionMismatch, Cause::Cogging], "{d:?}");
+    assert!(d.findings.windows(2).all(|w| w[0].share >= w[1].share));
+}
+
+#[test]
+fn what_fits_nothing_is_called_unknown() {
+    // A torque that jumps between levels at irregular times.
+    let level = |t: f64| if ((t * 0.37).sin() + (t * 0.83).sin()) > 0.2 { 0.25 } else { -0.25 };
+    let d = judged(&recording(|t, _, _, _| level(t)));
+    assert_eq!(d.verdict, Verdict::UnknownCause, "{:?}", d.findings);
+    assert!(d.findings.is_empty() && d.unexplained.describes.contains("lives in"), "{}", d.unexplained.describes);
+}
+
+#[test]
+fn too_little_data_is_said_with_what_is_missing() {
+    let whole = recording(|_, _, _, _| 0.0);
+    let cut = |rows: std::ops::Range<usize>| {
+        let columns = whole.columns.iter().map(|c| Column::new(&c.name, c.values[rows.clone()].to_vec())).collect();
+        Recording::from_columns("cut", whole.time_s[rows.clone()].to_vec(), columns).unwrap()
+    };
+    let short = judged(&cut(0..400));
+    assert!(short.verdict == Verdict::InsufficientData && short.missing[0].contains("record"), "{short:?}");
+    let no_torque = Recording::from_columns("t", whole.time_s.clone(), vec![whole.columns[0].clone()]).unwrap();
+    let blind = judged(&no_torque);
+    assert!(blind.verdict == Verdict::InsufficientData && blind.missing[0].contains("x.torque_nm"), "{blind:?}");
+}
+
+#[test]
+fn it_stops_when_told_to() {
+    let stopped = diagnose(&axis(), &recording(|_, _, v, _| 0.1 * v.signum()), None, &|_| false);
+    assert_eq!(stopped.err(), Some(Stopped));
+}
+
+#[test]
+fn an_extended_machine_survives_its_file_and_answers_no_discrepancy() {
+    let r = recording(|_, _, v, _| 0.1 * v.signum());
+    let d = judged(&r);
+    let mut machine = Machine::parse(MACHINE).unwrap();
+    machine.axes[0] = d.extended;
+    let again = Machine::parse(&machine.to_json().to_string()).unwrap();
+    assert_eq!(diagnose(&again.axes[0], &r, None, &|_| true).unwrap().verdict, Verdict::NoDiscrepancy);
+}
+
+fn data(path: &str) -> Option<PathBuf> {
+    let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let root = std::env::var_os("GIB_DATA").map_or_else(beside, PathBuf::from);
+    let file = root.join(path);
+    if file.exists() {
+        return Some(file);
+    }
+    println!("skipped: {} is not at hand", file.display());
+    None
+}
+
+#[test]
+fn the_clean_rig_is_clean() {
+    let (Some(machine), Some(recording)) = (data("rig-clean/machine.json"), data("rig-clean/recording.csv")) else {
+        return;
+    };
+    let axis = Machine::load(&machine).unwrap().axes.remove(0);
+    let d = diagnose(&axis, &Recording::open(&recording).unwrap(), None, &|_| true).unwrap();
+    assert_eq!(d.verdict, Verdict::NoDiscrepancy, "{:?}", d.findings);
+}
+
+#[test]
+fn emps_shows_timing_direction_dip_and_ripple_and_not_what_it_has_not() {
+    let (Some(machine), Some(recording)) = (data("emps/machine.json"), data("emps/emps.csv")) else { return };
+    let axis = Machine::load(&machine).unwrap().axes.remove(0);
+    let d = diagnose(&axis, &Recording::open(&recording).unwrap(), None, &|_| true).unwrap();
+    let of = |cause: Cause| d.findings.iter().find(|f| f.effect.cause() == cause).map(|f| f.effect.values());
+    let delay = of(Cause::DeadTime).unwrap()[0];
+    assert!((-1.6..-0.3).contains(&delay), "{delay}");
+    assert!(of(Cause::DirectionDependentFriction).unwrap()[0] < -20.0);
+    let dip = of(Cause::StribeckFriction).unwrap();
+    assert!((-12.0..-4.0).contains(&dip[0]) && (5.0..25.0).contains(&dip[1]), "{dip:?}");
+    let ripple = of(Cause::Cogging).unwrap();
+    assert!((2.45..2.55).contains(&ripple[1]), "{ripple:?}");
+    for absent in [Cause::ThermalDrift, Cause::QuadraticDrag, Cause::InertiaMismatch] {
+        assert!(of(absent).is_none(), "{absent}");
+    }
+    assert!((0.5..1.2).contains(&d.gains[0].after), "{:?}", d.gains);
+}
