@@ -24,7 +24,7 @@ fn noise(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// 30 s at 1 kHz: two sines of incommensurate periods, 0.1 µm grid, torque noise 0.03 N·m. `extra` adds to the believed
+/// 30 s at 1 kHz: two sines of incommensurate periods, 0.01 µm grid, torque noise 0.03 N·m. `extra` adds to the believed
 /// torque: of time (s), position (mm), speed (mm/s), acceleration (mm/s²).
 fn recording(extra: impl Fn(f64, f64, f64, f64) -> f64) -> Recording {
     let (w1, w2) = (TAU * 0.21, TAU * 0.57);
@@ -38,7 +38,7 @@ fn recording(extra: impl Fn(f64, f64, f64, f64) -> f64) -> Recording {
         let a = -60.0 * w1 * w1 * (w1 * t).sin() - 12.0 * w2 * w2 * (w2 * t).sin();
         let believed = 0.003 * a * unit + 0.008 * v * unit + 0.9 * v.signum() + 0.1;
         columns[0].push(t);
-        columns[1].push((x * 1e4).round() / 1e4);
+        columns[1].push((x * 1e5).round() / 1e5);
         columns[2].push(believed + extra(t, x, v, a) + 0.03 * noise());
     }
     let [time, x, torque] = columns;

@@ -284,12 +284,12 @@ fn map_rows(columns: &Columns, rule: impl Fn(&[f64], usize) -> f64) -> Vec<f64> 
     out
 }
 
-/// Least width at which the encoder's grid, seen through the inertia, is no louder than twice the torque's own noise: a
-/// wider filter would be quieter and hide what is fast.
+/// Least width at which the encoder's grid, seen through the inertia, is no louder than the torque's own noise: a
+/// wider filter would be quieter and hide what is fast, a narrower one would bias the inertia.
 fn fit_width(bend_noise: f64, torque_noise: f64) -> usize {
     for half in 1..40 {
         let kernel = LowPass { width: 2 * half + 1 }.kernel();
-        if bend_noise * norm(&convolve(&kernel, &[1.0, -2.0, 1.0])) <= 2.0 * torque_noise * norm(&kernel) {
+        if bend_noise * norm(&convolve(&kernel, &[1.0, -2.0, 1.0])) <= torque_noise * norm(&kernel) {
             return 2 * half + 1;
         }
     }

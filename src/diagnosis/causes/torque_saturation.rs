@@ -6,7 +6,7 @@ use super::*;
 /// Parameter: the limit as a share of the largest measured torque. The coefficient is 1 − r.
 pub static LAW: Law = Law {
     cause: Cause::TorqueSaturation,
-    scales: &[Scale::Log(0.1, 0.98)],
+    scales: &[Scale::Log(0.25, 0.98)],
     starts: |_, _| (0..9).map(|i| vec![0.3 + 0.075 * f64::from(i)]).collect(),
     starts_from_rest: false,
     term: |frame, shape| {
@@ -17,7 +17,10 @@ pub static LAW: Law = Law {
     effect: |frame, shape, c| {
         let slope_ratio = 1.0 - c.first()?;
         let sound = (-0.15..0.9).contains(&slope_ratio);
-        sound.then(|| Effect::TorqueSaturation { limit: shape[0] * peak(frame), slope_ratio: slope_ratio.max(0.0) })
+        // The trace is made of the measured torque: a limit within friction would explain any torque by itself.
+        let above_friction = shape[0] * peak(frame) > 1.3 * (frame.belief.coulomb + frame.belief.constant.abs());
+        (sound && above_friction)
+            .then(|| Effect::TorqueSaturation { limit: shape[0] * peak(frame), slope_ratio: slope_ratio.max(0.0) })
     },
     confused_with: &[Cause::InertiaMismatch, Cause::QuadraticDrag],
     sentence: |effect, axis| match effect {
