@@ -1,0 +1,78 @@
+#!/bin/sh
+# The harness under AddressSanitizer and UBSan, library included, and under valgrind's memcheck.
+#
+#   checked_memory.sh sanitizers TEST...     names of test programs, without .c
+#   checked_memory.sh memcheck PROGRAM...    programs that are built already
+#
+# A fault put in on purpose must be caught first; then the programs must be clean. A tool that is not here is named.
+set -eu
+cd "$(dirname "$0")"
+root=$(cd .. && pwd)
+out=$root/build/harness/checked
+kind=$1
+shift
+mkdir -p "$out"
+
+skip() { echo "checked_memory: $kind skipped, $1"; exit 0; }
+
+# caught COMMAND...: it must fail
+caught() {
+    if "$@" >"$out/seed.log" 2>&1; then
+        echo "checked_memory: not caught: $*" >&2
+        exit 1
+    fi
+}
+
+# clean COMMAND...: it must not fail; what it says is shown when it does
+clean() {
+    "$@" >"$out/run.log" 2>&1 || { tail -n 40 "$out/run.log" >&2; echo "checked_memory: failed: $*" >&2; exit 1; }
+}
+
+if [ "$kind" = memcheck ]; then
+    command -v valgrind >/dev/null || skip "no valgrind"
+    memcheck="valgrind -q --error-exitcode=9 --leak-check=full --errors-for-leak-kinds=definite"
+    gcc -std=c11 -g -I../include seeded_memory_fault.c "$root/build/lib/libgib.a" -lm -lpthread -ldl -o "$out/seeded"
+    clean "$out/seeded" overread # nothing but the tool notices
+    caught $memcheck "$out/seeded" overread
+    clean $memcheck "$out/seeded" none
+    for program; do
+        clean $memcheck "$program"
+        echo "memcheck: $(basename "$program") clean"
+    done
+    exit 0
+fi
+
+command -v clang >/dev/null || skip "no clang"
+target=x86_64-unknown-linux-gnu
+[ "$(uname -sm)" = "Linux x86_64" ] || skip "set up for Linux on x86_64 only"
+flags="-std=c11 -D_GNU_SOURCE -O1 -g -I../include -fsanitize=address,undefined -fno-sanitize-recover=all"
+echo 'int main(void) { return 0; }' >"$out/empty.c"
+clang $flags "$out/empty.c" -o "$out/empty" 2>/dev/null || skip "clang has no sanitizers (libclang-rt-dev)"
+
+# Only the library, and only what changed since the last time. The switch is for compilers of developers, hence the
+# variable that says so; a compiler that still refuses it is named.
+if ! RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=address -Cdebug-assertions=on -Coverflow-checks=on" \
+    CARGO_TARGET_DIR="$root/build/asan" ${CARGO:-cargo} build -q --manifest-path "$root/Cargo.toml" --lib --release \
+    --target $target 2>"$out/cargo.log"; then
+    grep -q 'sanitizer' "$out/cargo.log" && skip "the Rust compiler has no sanitizers"
+    cat "$out/cargo.log" >&2
+    exit 1
+fi
+library=$root/build/asan/$target/release/libgib.a
+helpers=
+for file in plant.c *_plant.c; do
+    [ ! -e "$file" ] || helpers="$helpers $file"
+done
+build() { clang $flags "$1.c" $helpers "$library" -lcmocka -lm -lpthread -ldl -o "$out/$1"; }
+
+build seeded_memory_fault
+caught "$out/seeded_memory_fault" overread
+grep -q 'AddressSanitizer: heap-buffer-overflow' "$out/seed.log"
+caught "$out/seeded_memory_fault" undefined
+grep -q 'signed integer overflow' "$out/seed.log"
+clean "$out/seeded_memory_fault" none
+for test; do
+    build "$test"
+    clean "$out/$test"
+    echo "sanitizers: $test clean"
+done
