@@ -87,6 +87,33 @@ pub const GIB_ERR_PROGRAM_CHANGED: i32 = -906;
 /// The program's owner could not be kept; nothing was written.
 pub const GIB_ERR_PROGRAM_OWNER: i32 = -907;
 
+/// The axis stood on the stop when homing began, or closer than the retraction.
+pub const GIB_ERR_HOMING_ON_STOP: i32 = -200;
+/// A stop was met before the smallest distance.
+pub const GIB_ERR_HOMING_EARLY: i32 = -201;
+/// The largest distance was gone and no stop met.
+pub const GIB_ERR_HOMING_NO_STOP: i32 = -202;
+/// Homing took longer than its time limit.
+pub const GIB_ERR_HOMING_TIME_LIMIT: i32 = -203;
+/// The touches disagree: chips before the stop, a tight spot, or a slipping encoder.
+pub const GIB_ERR_HOMING_TOUCHES: i32 = -204;
+/// The torque rises over a longer way than a dead stop allows.
+pub const GIB_ERR_HOMING_SOFT_STOP: i32 = -205;
+/// What was pressed on also holds the axis on the way back: a tight spot, not a stop.
+pub const GIB_ERR_HOMING_TIGHT_SPOT: i32 = -206;
+/// The torque against position is not a level and then a line.
+pub const GIB_ERR_HOMING_SHAPE: i32 = -207;
+/// The torque is too noisy for the tolerance of the touches.
+pub const GIB_ERR_HOMING_NOISE: i32 = -208;
+/// The axis stands against its command and the torque reading does not change: the torque sensor is stuck.
+pub const GIB_ERR_HOMING_TORQUE_STUCK: i32 = -209;
+/// The axis stands and the torque points away from the stop: the torque's sign is inverted.
+pub const GIB_ERR_HOMING_TORQUE_SIGN: i32 = -210;
+/// The encoder stands still while torque or command say that the motor moves, or it jumps.
+pub const GIB_ERR_HOMING_ENCODER: i32 = -211;
+/// Gantry: the two sides are further apart than the square tolerance.
+pub const GIB_ERR_HOMING_SQUARE: i32 = -212;
+
 /// Every status and the sentence that explains it.
 const TEXTS: &[(i32, &str)] = &[
     (GIB_OK, "ok\0"),
@@ -129,6 +156,19 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_PROGRAM_BUSY, "another writer of the program did not finish in time\0"),
     (GIB_ERR_PROGRAM_CHANGED, "another program changes the file all the time; nothing was written\0"),
     (GIB_ERR_PROGRAM_OWNER, "the program's owner could not be kept; nothing was written\0"),
+    (GIB_ERR_HOMING_ON_STOP, "the axis stood on the stop, or too close to it, when homing began\0"),
+    (GIB_ERR_HOMING_EARLY, "a stop was met before the smallest distance\0"),
+    (GIB_ERR_HOMING_NO_STOP, "the largest distance was gone and no stop met\0"),
+    (GIB_ERR_HOMING_TIME_LIMIT, "homing took longer than its time limit\0"),
+    (GIB_ERR_HOMING_TOUCHES, "the touches disagree: chips, a tight spot or a slipping encoder\0"),
+    (GIB_ERR_HOMING_SOFT_STOP, "the torque rises over a longer way than a dead stop allows\0"),
+    (GIB_ERR_HOMING_TIGHT_SPOT, "what was pressed on holds the axis both ways: a tight spot\0"),
+    (GIB_ERR_HOMING_SHAPE, "torque against position is not a level and then a line\0"),
+    (GIB_ERR_HOMING_NOISE, "the torque is too noisy for the tolerance of the touches\0"),
+    (GIB_ERR_HOMING_TORQUE_STUCK, "the torque reading is stuck\0"),
+    (GIB_ERR_HOMING_TORQUE_SIGN, "the torque's sign is inverted\0"),
+    (GIB_ERR_HOMING_ENCODER, "the encoder stands still or jumps\0"),
+    (GIB_ERR_HOMING_SQUARE, "the two sides of the gantry are not square\0"),
 ];
 
 /// The text of a status, NUL-terminated and static; for an unknown number a text that says so.

@@ -5,12 +5,16 @@
 //! signatures, and `tests/header.rs` fails when an exported function is not here.
 
 use super::backlash::*;
+use super::homing::*;
 use super::program::*;
 use super::types::GibErrorDetail;
 use super::{GIB_ABI_VERSION, gib_abi_version, gib_status_text, gib_version};
 use crate::cycle::backlash::config::BacklashConfig;
 use crate::cycle::backlash::io::{BacklashInput, BacklashOutput};
 use crate::cycle::backlash::verdict::{BacklashComparison, BacklashReport};
+use crate::cycle::homing::config::HomingConfig;
+use crate::cycle::homing::io::{HomingInput, HomingOutput};
+use crate::cycle::homing::verdict::HomingReport;
 use core::ffi::{c_char, c_void};
 
 /// All functions of the library, each named as in this header without its `gib_`.
@@ -95,6 +99,26 @@ pub struct GibApiTable {
     pub program_last_error: unsafe extern "C" fn(handle: *const GibProgram, detail: *mut GibErrorDetail) -> i32,
     /// See gib_program_last_error_text.
     pub program_last_error_text: unsafe extern "C" fn(handle: *const GibProgram, text: *mut c_char, size: usize) -> i32,
+
+    /// See gib_homing_size.
+    pub homing_size: extern "C" fn() -> usize,
+    /// See gib_homing_init_in.
+    pub homing_init_in: unsafe extern "C" fn(memory: *mut c_void, size: usize, out: *mut *mut GibHoming) -> i32,
+    /// See gib_homing_new.
+    pub homing_new: extern "C" fn() -> *mut GibHoming,
+    /// See gib_homing_free.
+    pub homing_free: unsafe extern "C" fn(handle: *mut GibHoming),
+    /// See gib_homing_start.
+    pub homing_start: unsafe extern "C" fn(handle: *mut GibHoming, config: *const HomingConfig) -> i32,
+    /// See gib_homing_step.
+    pub homing_step:
+        unsafe extern "C" fn(handle: *mut GibHoming, input: *const HomingInput, output: *mut HomingOutput) -> i32,
+    /// See gib_homing_abort.
+    pub homing_abort: unsafe extern "C" fn(handle: *mut GibHoming) -> i32,
+    /// See gib_homing_result.
+    pub homing_result: unsafe extern "C" fn(handle: *const GibHoming, report: *mut HomingReport) -> i32,
+    /// See gib_homing_last_error.
+    pub homing_last_error: unsafe extern "C" fn(handle: *const GibHoming, detail: *mut GibErrorDetail) -> i32,
 }
 
 static API: GibApiTable = GibApiTable {
@@ -128,6 +152,16 @@ static API: GibApiTable = GibApiTable {
     program_remove: gib_program_remove,
     program_last_error: gib_program_last_error,
     program_last_error_text: gib_program_last_error_text,
+
+    homing_size: gib_homing_size,
+    homing_init_in: gib_homing_init_in,
+    homing_new: gib_homing_new,
+    homing_free: gib_homing_free,
+    homing_start: gib_homing_start,
+    homing_step: gib_homing_step,
+    homing_abort: gib_homing_abort,
+    homing_result: gib_homing_result,
+    homing_last_error: gib_homing_last_error,
 };
 
 /// The table of all functions, so that `dlsym` needs one name: "gib_api".

@@ -8,6 +8,7 @@
 pub mod api;
 pub mod backlash;
 pub mod guard;
+pub mod homing;
 pub mod program;
 pub mod types;
 

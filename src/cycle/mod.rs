@@ -5,5 +5,6 @@
 //! locks, reads a clock or can panic.
 
 pub mod backlash;
+pub mod homing;
 pub mod level;
 pub mod profile;

@@ -1,0 +1,227 @@
+/* See homing_plant.h. */
+#include "homing_plant.h"
+
+#include <math.h>
+#include <string.h>
+
+/* splitmix64: one word of state, good enough for sensor noise. */
+double homing_plant_uniform(uint64_t *state)
+{
+    uint64_t z = (*state += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return (double)((z ^ (z >> 31)) >> 11) / 9007199254740992.0;
+}
+
+static double normal(uint64_t *state)
+{
+    double u = 1.0 - homing_plant_uniform(state);
+    return sqrt(-2.0 * log(u)) * cos(6.283185307179586 * homing_plant_uniform(state));
+}
+
+homing_plant_config homing_plant_default(void)
+{
+    homing_plant_config c;
+    memset(&c, 0, sizeof c);
+    c.motors = 1;
+    c.sense = 1.0;
+    c.cycle_s = 0.001;
+    c.substeps = 20;
+    c.motor_inertia_nm_s2_mm = 0.0010;
+    c.table_inertia_nm_s2_mm = 0.0008;
+    c.stiffness_nm_mm = 137.0;
+    c.damping_nm_s_mm = 0.05;
+    c.clearance_mm = 0.018;
+    c.friction_nm = 1.5;
+    c.motor_share = 0.2;
+    c.breakaway_ratio = 1.1;
+    c.stop_mm[0] = c.stop_mm[1] = 6.0;
+    c.stop_stiffness_nm_mm = 400.0;
+    c.stop_damping_nm_s_mm = 0.1;
+    c.chips_crush_mm = 1e9;
+    c.tight_width_mm = 1.0;
+    c.position_gain_1_s = 40.0;
+    c.velocity_gain_nm_s_mm = 0.33;
+    c.velocity_integral_time_s = 0.02;
+    c.velocity_feedforward = 1.0;
+    c.torque_time_constant_s = 0.0005;
+    c.torque_limit_nm = 16.0;
+    c.encoder_mm = 0.0001;
+    c.torque_noise_nm = 0.15;
+    c.seed = 1;
+    return c;
+}
+
+void homing_plant_init(homing_plant *p, const homing_plant_config *c)
+{
+    memset(p, 0, sizeof *p);
+    p->c = *c;
+    p->random = c->seed;
+    p->limit_nm = c->torque_limit_nm;
+    p->first_cycle = 1;
+    for (int i = 0; i < 2; i++) {
+        p->side[i].motor_sticks = p->side[i].table_sticks = 1;
+    }
+}
+
+static double deadzone(double wound, double clearance)
+{
+    double half = 0.5 * clearance;
+    return wound > half ? wound - half : wound < -half ? wound + half : 0.0;
+}
+
+/* One body with Coulomb friction: sticks at rest, slides beyond break-away. Semi-implicit Euler. */
+static void move(double *x, double *v, int *sticks, double force, double sliding, double breakaway, double inertia,
+                 double dt)
+{
+    if (*sticks && fabs(force) <= breakaway) {
+        return;
+    }
+    *sticks = 0;
+    double sense = copysign(1.0, *v != 0.0 ? *v : force);
+    double faster = *v + dt * (force - sense * sliding) / inertia;
+    if (*v != 0.0 && faster * *v <= 0.0) {
+        *v = 0.0;
+        *sticks = 1;
+        return;
+    }
+    *v = faster;
+    *x += dt * faster;
+}
+
+/* Elastic and damped, but it only pushes. */
+static double pushes(double depth, double speed, double stiffness, double damping)
+{
+    return depth > 0.0 ? fmax(stiffness * depth + damping * speed, 0.0) : 0.0;
+}
+
+static void substep(homing_plant *p, homing_plant_side *s, int i, double torque_command, double dt)
+{
+    const homing_plant_config *c = &p->c;
+    double lag = c->torque_time_constant_s;
+    s->torque += (torque_command - s->torque) * (lag > 0.0 ? 1.0 - exp(-dt / lag) : 1.0);
+    double wound = deadzone(s->x - s->y, c->clearance_mm);
+    double drive = wound != 0.0 ? c->stiffness_nm_mm * wound + c->damping_nm_s_mm * (s->vx - s->vy) : 0.0;
+    double against = c->constant_nm + c->viscous_nm_s_mm * s->vy;
+    against += pushes(s->y - c->stop_mm[i], s->vy, c->stop_stiffness_nm_mm, c->stop_damping_nm_s_mm);
+    if (c->chips_mm > 0.0) {
+        double depth = s->y - (c->stop_mm[i] - c->chips_mm) - s->crushed;
+        against += pushes(depth, s->vy, c->chips_stiffness_nm_mm, 0.0);
+        /* Pressed hard they give way, once by the crushed layer. */
+        if (c->chips_stiffness_nm_mm * depth > 2.0 && s->crushed < c->chips_mm) {
+            s->crushed += dt * c->chips_crush_mm;
+        }
+    }
+    if (c->motors == 2) {
+        double askew = (s->y - c->stop_mm[i]) - (p->side[1 - i].y - c->stop_mm[1 - i]);
+        against += c->beam_nm_mm * (askew + (c->stop_mm[i] - c->stop_mm[1 - i]));
+    }
+    double far = (s->y - c->tight_mm) / c->tight_width_mm;
+    double friction = (1.0 - c->motor_share) * c->friction_nm + c->tight_nm * fmax(0.0, 1.0 - far * far);
+    double motor_friction = c->motor_share * c->friction_nm;
+    move(&s->x, &s->vx, &s->motor_sticks, s->torque - drive, motor_friction, motor_friction,
+         c->motor_inertia_nm_s2_mm, dt);
+    move(&s->y, &s->vy, &s->table_sticks, drive - against, friction, c->breakaway_ratio * friction,
+         c->table_inertia_nm_s2_mm, dt);
+}
+
+/* The servo of one side; `target` in mm toward the stop. */
+static double servo(homing_plant *p, homing_plant_side *s, double target, double encoder)
+{
+    const homing_plant_config *c = &p->c;
+    double step = target - s->last_target, velocity = (encoder - s->last_encoder) / c->cycle_s;
+    s->last_target = target;
+    s->last_encoder = encoder;
+    double error = c->position_gain_1_s * (target - encoder) + c->velocity_feedforward * step / c->cycle_s - velocity;
+    double wanted = c->velocity_gain_nm_s_mm * (error + s->integral);
+    double limited = fmin(fmax(wanted, -p->limit_nm), p->limit_nm);
+    if (limited == wanted && c->velocity_integral_time_s > 0.0) {
+        s->integral += error * c->cycle_s / c->velocity_integral_time_s;
+    }
+    return limited;
+}
+
+static double encoder(homing_plant *p, homing_plant_side *s)
+{
+    const homing_plant_config *c = &p->c;
+    if (p->fault == FAULT_ENCODER_SLIPS && s->vx > 0.0) {
+        s->slipped += 0.02 * s->vx * c->cycle_s; /* 2 % on the way to the stop only */
+    } else if (p->fault == FAULT_ENCODER_JUMPS && s->slipped == 0.0) {
+        s->slipped = 0.3;
+    }
+    double x = s->x - s->slipped;
+    double grid = c->encoder_mm > 0.0 ? c->encoder_mm * floor(x / c->encoder_mm + 0.5) : x;
+    if (p->fault != FAULT_ENCODER_FROZEN) {
+        s->frozen_at = grid;
+    }
+    return s->frozen_at;
+}
+
+static double torque_reading(homing_plant *p, homing_plant_side *s)
+{
+    double t = s->torque + p->c.torque_noise_nm * normal(&p->random);
+    if (p->fault == FAULT_TORQUE_STUCK || p->fault == FAULT_TORQUE_STUCK_HIGH) {
+        return p->fault == FAULT_TORQUE_STUCK ? s->stuck_at : p->in.torque_limit * 0.98;
+    }
+    s->stuck_at = t;
+    return p->fault == FAULT_TORQUE_NAN ? NAN : p->fault == FAULT_TORQUE_INVERTED ? -t : t;
+}
+
+static void serve_requests(homing_plant *p)
+{
+    if (p->out.request_id == p->done_id || p->fault == FAULT_NO_ACKNOWLEDGEMENT) {
+        return;
+    }
+    if (p->out.requests & GIB_HOMING_REQUEST_TORQUE_LIMIT) {
+        p->in.torque_limit = p->out.torque_limit;
+        if (p->fault != FAULT_LIMIT_IGNORED) {
+            p->limit_nm = p->out.torque_limit;
+        }
+    }
+    if (p->out.requests & GIB_HOMING_REQUEST_SET_POSITION) {
+        p->shift_mm[0] = p->out.shift_mm[0];
+        p->shift_mm[1] = p->out.shift_mm[1];
+    }
+    if (p->out.requests & GIB_HOMING_REQUEST_CLEAR_DEVIATION) {
+        for (int i = 0; i < p->c.motors; i++) {
+            p->side[i].last_target = p->c.sense * p->out.target_position_mm[i]; /* dropped, not moved */
+        }
+    }
+    p->done_id = p->out.request_id;
+}
+
+const gib_homing_input *homing_plant_cycle(homing_plant *p)
+{
+    const homing_plant_config *c = &p->c;
+    if (p->first_cycle) {
+        p->in.torque_limit = p->limit_nm;
+    }
+    serve_requests(p);
+    for (int i = 0; i < c->motors; i++) {
+        homing_plant_side *s = &p->side[i];
+        double x = encoder(p, s);
+        p->in.position_mm[i] = c->sense * (p->fault == FAULT_ENCODER_NAN ? NAN : x);
+        p->in.torque[i] = c->sense * torque_reading(p, s);
+        double target = p->out.owns_motion ? c->sense * p->out.target_position_mm[i] : s->last_target;
+        if (p->first_cycle || (p->owned && !p->out.owns_motion)) {
+            s->last_encoder = p->first_cycle ? x : s->last_encoder;
+            s->last_target = target = x; /* the kernel takes over where the axis is */
+        }
+        double wanted = servo(p, s, target, x);
+        if (p->out.stop_drive || p->fault == FAULT_DRIVE_TRIP) {
+            wanted = s->integral = 0.0;
+            s->vx *= 0.5; /* the brake */
+        }
+        for (int k = 0; k < c->substeps; k++) {
+            substep(p, s, i, wanted, c->cycle_s / c->substeps);
+        }
+        p->most_torque_nm = fmax(p->most_torque_nm, fabs(s->torque));
+        p->most_travel_mm = fmax(p->most_travel_mm, s->y);
+    }
+    p->in.acknowledged_id = p->done_id;
+    p->in.flags = p->fault == FAULT_DRIVE_TRIP ? GIB_INPUT_FAULT : p->fault == FAULT_ABORT ? GIB_INPUT_ABORT : 0u;
+    p->first_cycle = 0;
+    p->owned = p->out.owns_motion;
+    p->time_s += c->cycle_s;
+    return &p->in;
+}

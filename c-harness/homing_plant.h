@@ -1,0 +1,83 @@
+/*
+ * An axis that runs against dead stops, to try homing on: one motor, or a gantry of two joined by a crossbeam. Each
+ * side is a motor, an elastic drive with clearance and a table with friction. It shares nothing with gib but the
+ * header. Positions in mm of load travel, torques in N·m at the motor; positive is toward the stop.
+ *
+ *   motor    Jm·x'' = T − Tm·sign(x') − Tdrive
+ *   table    Jt·y'' = Tdrive − Ts·sign(y') − B·y' − T0 − Tstop − Tchips − Tbeam
+ *   stop     Tstop = ks·(y − ystop) + ds·y' where that pushes back, else 0
+ *   servo    P position, PI velocity, feed-forward, torque limit, first-order current loop, on the quantised encoder
+ */
+#ifndef HOMING_PLANT_H
+#define HOMING_PLANT_H
+
+#include "gib.h"
+#include <stdint.h>
+
+typedef struct {
+    int motors;
+    double sense; /* of the stop in the coordinates that gib sees, +1 or -1 */
+    double cycle_s;
+    int substeps;
+    double motor_inertia_nm_s2_mm, table_inertia_nm_s2_mm;
+    double stiffness_nm_mm, damping_nm_s_mm, clearance_mm; /* drive */
+    double friction_nm, motor_share, breakaway_ratio, viscous_nm_s_mm, constant_nm;
+    double stop_mm[2], stop_stiffness_nm_mm, stop_damping_nm_s_mm;
+    double beam_nm_mm;                                             /* crossbeam of a gantry */
+    double chips_mm, chips_stiffness_nm_mm, chips_crush_mm;        /* layer before the stop; what a press crushes */
+    double tight_mm, tight_width_mm, tight_nm;                     /* extra friction there */
+    double position_gain_1_s, velocity_gain_nm_s_mm, velocity_integral_time_s, velocity_feedforward;
+    double torque_time_constant_s, torque_limit_nm;                /* the drive's own limit */
+    double encoder_mm, torque_noise_nm;
+    uint64_t seed;
+} homing_plant_config;
+
+/* What may go wrong. */
+typedef enum {
+    FAULT_NONE,
+    FAULT_TORQUE_STUCK,
+    FAULT_TORQUE_STUCK_HIGH,
+    FAULT_TORQUE_INVERTED,
+    FAULT_TORQUE_NAN,
+    FAULT_ENCODER_FROZEN,
+    FAULT_ENCODER_SLIPS, /* a little in every cycle */
+    FAULT_ENCODER_JUMPS,
+    FAULT_ENCODER_NAN,
+    FAULT_NO_ACKNOWLEDGEMENT,
+    FAULT_LIMIT_IGNORED, /* acknowledged, but the drive does not limit */
+    FAULT_DRIVE_TRIP,
+    FAULT_ABORT
+} homing_fault;
+
+typedef struct {
+    double x, vx, y, vy;
+    int motor_sticks, table_sticks;
+    double torque, integral, last_encoder, last_target;
+    double crushed; /* of the chips */
+    double slipped, frozen_at, stuck_at;
+} homing_plant_side;
+
+typedef struct {
+    homing_plant_config c;
+    homing_plant_side side[2];
+    /* the kernel */
+    double limit_nm;
+    uint32_t done_id;
+    double shift_mm[2];
+    gib_homing_output out;
+    gib_homing_input in;
+    homing_fault fault;
+    int first_cycle, owned;
+    uint64_t random;
+    double time_s;
+    double most_torque_nm, most_travel_mm; /* of the real motor, table */
+} homing_plant;
+
+homing_plant_config homing_plant_default(void);
+void homing_plant_init(homing_plant *p, const homing_plant_config *c);
+/* The axis moves for one cycle as gib asked for in `out`, and the kernel carries out requests; fills `in`. */
+const gib_homing_input *homing_plant_cycle(homing_plant *p);
+/* Uniform in [0, 1). */
+double homing_plant_uniform(uint64_t *state);
+
+#endif

@@ -1,0 +1,260 @@
+//! Family `homing`: homing on a dead stop by torque limit, as seen from C.
+
+use super::guard::{guarded, instance, instance_mut, placed, versioned};
+use super::types::GibErrorDetail;
+use crate::cycle::homing::config::HomingConfig;
+use crate::cycle::homing::io::{GIB_HOMING_FAILED, HomingInput, HomingOutput};
+use crate::cycle::homing::machine::Homing;
+use crate::cycle::homing::plan::Plan;
+use crate::cycle::homing::verdict::HomingReport;
+use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_OK};
+use core::ffi::c_void;
+
+/// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
+const ALIVE: u64 = 0x6769_625f_686f_0001;
+
+/// Homing of one axis, of one motor or two. Opaque; its size is `gib_homing_size()`.
+#[repr(C, align(16))]
+pub struct GibHoming {
+    alive: u64,
+    last: Fault,
+    machine: Homing,
+}
+
+impl super::guard::Instance for GibHoming {
+    fn alive(&self) -> bool {
+        self.alive == ALIVE
+    }
+    fn new() -> GibHoming {
+        GibHoming { alive: ALIVE, last: Fault::NONE, machine: Homing::default() }
+    }
+    fn bury(&mut self) {
+        self.alive = 0;
+    }
+}
+
+/// Runs a call that can be refused, and keeps the reason for `_last_error`.
+fn refusable(handle: &mut GibHoming, call: impl FnOnce(&mut Homing) -> Result<(), Fault>) -> i32 {
+    match call(&mut handle.machine) {
+        Ok(()) => {
+            handle.last = Fault::NONE;
+            GIB_OK
+        }
+        Err(fault) => {
+            handle.last = fault;
+            fault.code
+        }
+    }
+}
+
+/// Bytes that an instance needs in memory of your own, to be aligned to 16.
+///
+/// @return the size in bytes, about 66 KiB.
+///
+/// [thread: any] [real-time: yes] [state: any]
+#[unsafe(no_mangle)]
+pub extern "C" fn gib_homing_size() -> usize {
+    size_of::<GibHoming>()
+}
+
+/// Makes an idle instance in memory of your own. There is nothing to free; zero or reuse the memory when done.
+///
+/// @param memory at least `gib_homing_size()` bytes, aligned to 16; stays yours.
+/// @param size bytes at `memory`.
+/// @param out receives the handle; NULL on error.
+/// @return GIB_OK; GIB_ERR_NULL; GIB_ERR_MEMORY when too small or misaligned.
+///
+/// [thread: setup] [real-time: no] [state: none]
+///
+/// # Safety
+/// `memory` is NULL or points to `size` writable bytes; `out` is NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn gib_homing_init_in(memory: *mut c_void, size: usize, out: *mut *mut GibHoming) -> i32 {
+    // SAFETY: the caller's promise is `placed`'s.
+    guarded(|| unsafe { placed(memory, size, out) })
+}
+
+/// Makes an idle instance in memory that gib allocates.
+///
+/// @return the handle, to be given to `gib_homing_free`; NULL when there is no memory.
+///
+/// [thread: setup] [real-time: no] [state: none]
+#[unsafe(no_mangle)]
+pub extern "C" fn gib_homing_new() -> *mut GibHoming {
+    super::guard::allocated()
+}
+
+/// Frees an instance made by `gib_homing_new`. NULL is allowed and does nothing.
+///
+/// Abort a running homing and step it to its end first: memory that is gone can restore nothing.
+///
+/// @param handle an instance from `gib_homing_new`, never one from `gib_homing_init_in`.
+///
+/// [thread: setup] [real-time: no] [state: not busy]
+///
+/// # Safety
+/// `handle` is NULL or came from `gib_homing_new` and was not freed before.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn gib_homing_free(handle: *mut GibHoming) {
+    // SAFETY: the caller's promise is `release`'s.
+    unsafe { super::guard::release(handle) }
+}
+
+/// Checks the configuration and arms a homing, which begins with the next step.
+///
+/// The rising edge of PLCopen's Execute. Clears the previous result and error. The old torque limit is read from
+/// `torque_limit` of the first step's input.
+///
+/// @param handle the instance.
+/// @param config how to home; copied. Set `struct_size`, zero the rest, then set what you want.
+/// @return GIB_OK; GIB_ERR_CONFIG (gib_homing_last_error names the field and its range), GIB_ERR_STRUCT_SIZE,
+/// GIB_ERR_STATE while busy, GIB_ERR_RESTORE_UNCONFIRMED while the old torque limit is still owed,
+/// GIB_ERR_NULL, GIB_ERR_HANDLE.
+///
+/// [thread: setup, or cycle between steps] [real-time: yes] [state: not busy]
+///
+/// # Safety
+/// `handle` is NULL or an instance; `config` is NULL or points to its `struct_size` readable bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn gib_homing_start(handle: *mut GibHoming, config: *const HomingConfig) -> i32 {
+    guarded(|| {
+        // SAFETY: the caller's promise.
+        let handle = unsafe { instance_mut(handle) }?;
+        // SAFETY: the caller's promise; the config is plain numbers.
+        let config = unsafe { versioned(config, HomingConfig::FIRST_SIZE) }?;
+        Ok(refusable(handle, |machine| machine.start(Plan::new(&config))))
+    })
+}
+
+/// One servo cycle. Call it in every cycle, also when idle: requests are made and restored through it.
+///
+/// While `owns_motion` is 1, follow `target_position_mm` and report each motor's position and torque of the same
+/// instant. When `request_id` changes, carry out `requests`, then report the number in `acknowledged_id`, and in
+/// `torque_limit` the limit in force. Take the torque off the motors while `stop_drive` is 1.
+///
+/// @param handle the instance.
+/// @param input measured values of this cycle.
+/// @param output commands for this cycle; always written when not NULL.
+/// @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
+/// GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_ACK_TIMEOUT, GIB_ERR_TORQUE_BOUND,
+/// GIB_ERR_TRAVEL_BOUND, GIB_ERR_DEADLINE, GIB_ERR_LAG, GIB_ERR_HOMING_...;
+/// and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+///
+/// [thread: cycle] [real-time: yes] [state: any]
+///
+/// # Safety
+/// `handle` is NULL or an instance; `input` is NULL or readable; `output` is NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn gib_homing_step(
+    handle: *mut GibHoming,
+    input: *const HomingInput,
+    output: *mut HomingOutput,
+) -> i32 {
+    // SAFETY: the caller promises each is NULL or valid.
+    let (mut handle, input, mut output) = unsafe { (handle.as_mut(), input.as_ref(), output.as_mut()) };
+    if let (Some(handle), Some(input), Some(output)) = (&mut handle, input, &mut output)
+        && handle.alive == ALIVE
+        && handle.machine.quick(input)
+    {
+        **output = *handle.machine.output();
+        return output.status;
+    }
+    in_full(handle, input, output)
+}
+
+/// A step that is not like the one before, or a call that was no step.
+#[inline(never)]
+fn in_full(handle: Option<&mut GibHoming>, input: Option<&HomingInput>, output: Option<&mut HomingOutput>) -> i32 {
+    match (handle, input, output) {
+        (Some(handle), Some(input), Some(output)) if handle.alive == ALIVE => {
+            handle.machine.step(input);
+            *output = *handle.machine.output();
+            output.status
+        }
+        (handle, input, output) => misused(handle, input, output),
+    }
+}
+
+/// A step without an instance, an input or an output: nothing moves, and the position asked for is the present one.
+#[cold]
+fn misused(handle: Option<&mut GibHoming>, input: Option<&HomingInput>, output: Option<&mut HomingOutput>) -> i32 {
+    let status = match &handle {
+        Some(handle) if handle.alive != ALIVE => GIB_ERR_HANDLE,
+        _ => GIB_ERR_NULL,
+    };
+    let place = |position: f64| if position.is_finite() { position } else { 0.0 };
+    let target_position_mm = input.map_or([0.0; 2], |input| input.position_mm.map(place));
+    if let Some(output) = output {
+        *output = match handle {
+            Some(handle) if handle.alive == ALIVE => *handle.machine.output(),
+            _ => HomingOutput { target_position_mm, phase: GIB_HOMING_FAILED, ..HomingOutput::default() },
+        };
+        output.target_speed_mm_s = [0.0; 2];
+        output.new_events = 0;
+        output.status = status;
+        output.message = status;
+    }
+    status
+}
+
+/// Aborts a running homing: the next steps brake, take the pressure off the stop, restore the old torque limit, and
+/// end with GIB_ERR_ABORTED. Does nothing when not busy. To abort from another thread set `GIB_INPUT_ABORT` in the input.
+///
+/// @param handle the instance.
+/// @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+///
+/// [thread: cycle] [real-time: yes] [state: any]
+///
+/// # Safety
+/// `handle` is NULL or an instance.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn gib_homing_abort(handle: *mut GibHoming) -> i32 {
+    guarded(|| {
+        // SAFETY: the caller's promise.
+        unsafe { instance_mut(handle) }?.machine.abort();
+        Ok(GIB_OK)
+    })
+}
+
+/// Reads what was found: complete after GIB_DONE, else what is known so far.
+///
+/// @param handle the instance.
+/// @param report receives it.
+/// @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+///
+/// [thread: cycle] [real-time: yes] [state: any]
+///
+/// # Safety
+/// `handle` is NULL or an instance; `report` is NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn gib_homing_result(handle: *const GibHoming, report: *mut HomingReport) -> i32 {
+    guarded(|| {
+        // SAFETY: the caller's promise.
+        let handle = unsafe { instance(handle) }?;
+        // SAFETY: the caller's promise.
+        let report = unsafe { report.as_mut() }.ok_or(GIB_ERR_NULL)?;
+        *report = handle.machine.report();
+        Ok(GIB_OK)
+    })
+}
+
+/// The first error of the present run, or why the last call was refused: code, field, value and bounds.
+///
+/// @param handle the instance.
+/// @param detail receives it; its `code` is GIB_OK when nothing went wrong.
+/// @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+///
+/// [thread: cycle] [real-time: yes] [state: any]
+///
+/// # Safety
+/// `handle` is NULL or an instance; `detail` is NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn gib_homing_last_error(handle: *const GibHoming, detail: *mut GibErrorDetail) -> i32 {
+    guarded(|| {
+        // SAFETY: the caller's promise.
+        let (handle, detail) = unsafe { (instance(handle)?, detail.as_mut().ok_or(GIB_ERR_NULL)?) };
+        let fault = if handle.last == Fault::NONE { handle.machine.fault() } else { handle.last };
+        *detail = fault.into();
+        Ok(GIB_OK)
+    })
+}

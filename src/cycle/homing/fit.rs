@@ -1,0 +1,360 @@
+//! Where the torque–position line of a touch starts: the contact point.
+//!
+//! Sliding toward the stop the torque is a level T₀ (friction, gravity). From contact on it rises with the
+//! stiffness of drive and stop in series, k in N·m/mm, while friction stays what it was:
+//!
+//! ```text
+//! T(x) = T₀                 x < xc
+//! T(x) = T₀ + k·(x − xc)    x ≥ xc          xc = x̄ − (T̄ − T₀)/k
+//! ```
+//!
+//! xc needs neither the torque limit nor k to be known, so neither moves the home position. First every split of the
+//! blocks into a level and a line is tried, least squares decides (Hudson's two-phase regression); then level and line
+//! are fitted anew without the blocks near the corner, where the axis still brakes and J·a disturbs the torque, and
+//! near the limit, where the drive cuts it off. Both are chosen by position, never by the noisy torque.
+//!
+//! Work is cut into slices of [`SLICE`] blocks, so that a cycle's share is bounded.
+
+use super::trace::{BLOCKS, Trace};
+
+/// Blocks looked at in a cycle.
+const SLICE: u32 = 8;
+/// Fewest blocks in a level or a line.
+const FEWEST: f64 = 6.0;
+/// Part of the line that is used: from the share of the rise where impact is over to the one where limiting is near.
+const LINE_FROM: f64 = 0.13;
+const LINE_TO: f64 = 0.95;
+/// The level ends this share of the line's length before the corner.
+const LEVEL_GAP: f64 = 0.1;
+
+/// Sums over blocks: number, ways x, torques t and their products.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    n: f64,
+    x: f64,
+    t: f64,
+    xx: f64,
+    xt: f64,
+    tt: f64,
+}
+
+impl Sums {
+    #[inline(always)]
+    fn add(&mut self, weight: f64, (x, t): (f64, f64)) {
+        self.n += weight;
+        self.x += weight * x;
+        self.t += weight * t;
+        self.xx += weight * x * x;
+        self.xt += weight * x * t;
+        self.tt += weight * t * t;
+    }
+
+    /// Squares of t about its mean.
+    fn scatter(&self) -> f64 {
+        (self.tt - self.t * self.t / self.n).max(0.0)
+    }
+
+    /// Squares of x about its mean, and products.
+    fn spread(&self) -> (f64, f64) {
+        (self.xx - self.x * self.x / self.n, self.xt - self.x * self.t / self.n)
+    }
+
+    /// Slope of the least-squares line and squares about it; slope 0 where x does not vary.
+    fn line(&self) -> (f64, f64) {
+        let (sxx, sxt) = self.spread();
+        if sxx <= 0.0 {
+            return (0.0, self.scatter());
+        }
+        let slope = sxt / sxx;
+        (slope, (self.scatter() - slope * sxt).max(0.0))
+    }
+}
+
+/// What a touch shows. Ways in mm from the touch's start, torque in the unit of the input, variances of one value.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Contact {
+    /// Way to the contact point.
+    pub way: f64,
+    /// Its variance, mm².
+    pub variance: f64,
+    /// Torque before contact.
+    pub level: f64,
+    /// Slope of the line: stiffness of drive and stop in series.
+    pub stiffness: f64,
+    /// Standard error of the slope.
+    pub stiffness_error: f64,
+    /// Standard deviation of a block about level and line.
+    pub noise: f64,
+    /// Way from contact to where the torque limit was reached.
+    pub press: f64,
+    /// Way at which the plain threshold was reached.
+    pub threshold_way: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Stage {
+    /// Ends when all blocks are summed or the threshold is met.
+    Gather,
+    /// Ends when every split is tried.
+    Scan,
+    /// Ends when level and line are summed anew.
+    Refine,
+    /// Ends with the next start.
+    Ready,
+}
+
+/// A fit under way.
+#[derive(Debug, Clone, Copy)]
+pub struct Fit {
+    stage: Stage,
+    /// Next block.
+    at: u32,
+    /// One past the last block before the limit.
+    end: u32,
+    /// Ways before this are not looked at: after a reversal the torque first takes up the lost motion.
+    from: f64,
+    threshold: f64,
+    over: u32,
+    first: f64,
+    last: f64,
+    window: f64,
+    early: Sums,
+    level: Sums,
+    line: Sums,
+    least: f64,
+    split: Contact,
+    found: Option<Contact>,
+}
+
+impl Default for Fit {
+    fn default() -> Fit {
+        Fit {
+            stage: Stage::Ready,
+            at: 0,
+            end: 0,
+            from: 0.0,
+            threshold: 0.0,
+            over: 0,
+            first: 0.0,
+            last: 0.0,
+            window: 0.0,
+            early: Sums::default(),
+            level: Sums::default(),
+            line: Sums::default(),
+            least: f64::INFINITY,
+            split: Contact::default(),
+            found: None,
+        }
+    }
+}
+
+impl Fit {
+    /// Begins: blocks at ways of `from` mm and up to `window` mm more count, up to where the torque reaches `threshold`.
+    pub fn start(&mut self, from: f64, window: f64, threshold: f64) {
+        *self = Fit { stage: Stage::Gather, from, window, threshold, first: f64::INFINITY, ..Fit::default() };
+    }
+
+    /// Cycles that a fit takes at most.
+    #[must_use]
+    pub fn slices_bound() -> u32 {
+        3 * (BLOCKS as u32 / SLICE + 2)
+    }
+
+    /// The contact, once ready; `None` when the trace has not the shape of a level and a line.
+    #[must_use]
+    pub fn found(&self) -> Option<Contact> {
+        self.found
+    }
+
+    /// Whether the torque already rises in the first quarter of the window, where a dead stop shows its level: at
+    /// least at half the pace that would bring it to the limit at the window's end.
+    #[must_use]
+    pub fn rises_early(&self) -> bool {
+        let early = &self.early;
+        let (slope, about) = early.line();
+        let error = (about / (early.n - 2.0).max(1.0) / early.spread().0).sqrt();
+        let pace = (self.threshold - early.t / early.n) / self.window;
+        early.n >= FEWEST && slope > 5.0 * error && slope > 0.5 * pace
+    }
+
+    /// One slice; true when ready.
+    pub fn slice(&mut self, trace: &Trace) -> bool {
+        let to = (self.at + SLICE).min(if self.stage == Stage::Gather { trace.len() } else { self.end });
+        for i in self.at..to {
+            let block = trace.block(i);
+            if block.0 >= self.from {
+                match self.stage {
+                    Stage::Gather => self.gather(i, block),
+                    Stage::Scan => self.scan(block),
+                    Stage::Refine => self.refine(block),
+                    Stage::Ready => {}
+                }
+            }
+        }
+        let whole = self.at + SLICE >= if self.stage == Stage::Gather { trace.len() } else { self.end };
+        self.at = to;
+        if whole {
+            self.next_stage(trace.len());
+        }
+        self.stage == Stage::Ready
+    }
+
+    /// Sums blocks up to two in a row beyond the threshold: one alone may be noise.
+    #[inline(always)]
+    fn gather(&mut self, i: u32, block: (f64, f64)) {
+        if self.end > 0 {
+            return;
+        }
+        self.over = if block.1 >= self.threshold { self.over + 1 } else { 0 };
+        self.line.add(1.0, block);
+        if block.0 < self.from + 0.25 * self.window {
+            self.early.add(1.0, block);
+        }
+        self.first = self.first.min(block.0);
+        self.last = block.0;
+        if self.over == 2 {
+            self.end = i.saturating_sub(1).max(1);
+            self.line.add(-1.0, block);
+        }
+    }
+
+    /// Moves a block from the line to the level and rates the split.
+    #[inline(always)]
+    fn scan(&mut self, block: (f64, f64)) {
+        self.line.add(-1.0, block);
+        self.level.add(1.0, block);
+        if self.level.n < FEWEST || self.line.n < FEWEST {
+            return;
+        }
+        let (slope, about_line) = self.line.line();
+        let about = self.level.scatter() + about_line;
+        if about < self.least && slope > 0.0 {
+            let level = self.level.t / self.level.n;
+            let way = self.line.x / self.line.n - (self.line.t / self.line.n - level) / slope;
+            self.least = about;
+            self.split = Contact { way, level, stiffness: slope, ..Contact::default() };
+        }
+    }
+
+    /// Sums what is surely level and what is surely line.
+    #[inline(always)]
+    fn refine(&mut self, block: (f64, f64)) {
+        let along = block.0 - self.split.way;
+        let length = self.split.press;
+        if along < -LEVEL_GAP * length {
+            self.level.add(1.0, block);
+        } else if along >= LINE_FROM * length && along <= LINE_TO * length {
+            self.line.add(1.0, block);
+        }
+    }
+
+    #[cold]
+    fn next_stage(&mut self, blocks: u32) {
+        self.at = 0;
+        self.stage = match self.stage {
+            Stage::Gather => {
+                self.end = if self.end > 0 { self.end } else { blocks };
+                Stage::Scan
+            }
+            Stage::Scan if self.least.is_finite() => {
+                self.split.press = self.last - self.split.way;
+                self.level = Sums::default();
+                self.line = Sums::default();
+                Stage::Refine
+            }
+            Stage::Scan | Stage::Ready => Stage::Ready,
+            Stage::Refine => {
+                self.found = self.solve();
+                Stage::Ready
+            }
+        };
+    }
+
+    /// Contact point and its variance from the refined sums; `None` for a curve that is not a level and a line.
+    fn solve(&self) -> Option<Contact> {
+        /// Standard errors by which the slope must be above zero.
+        const SURE: f64 = 5.0;
+        let (level, line) = (&self.level, &self.line);
+        if !(level.n >= FEWEST && line.n >= FEWEST && self.split.press > 0.0) {
+            return None;
+        }
+        let torque = level.t / level.n;
+        let (slope, about_line) = line.line();
+        let (sxx, _) = line.spread();
+        let scatter = (level.scatter() + about_line) / (level.n + line.n - 3.0);
+        let slope_error = (about_line / (line.n - 2.0) / sxx).sqrt();
+        // Not `<=`: a slope that is no number is no slope.
+        if !(slope > SURE * slope_error) {
+            return None;
+        }
+        let mean = line.x / line.n;
+        let way = mean - (line.t / line.n - torque) / slope;
+        let of_level = level.scatter() / (level.n - 1.0) / level.n;
+        let of_line = about_line / (line.n - 2.0) * (1.0 / line.n + (mean - way) * (mean - way) / sxx);
+        let contact = Contact {
+            way,
+            variance: (of_level + of_line) / (slope * slope),
+            level: torque,
+            stiffness: slope,
+            stiffness_error: slope_error,
+            noise: scatter.sqrt(),
+            press: (self.threshold - torque) / slope,
+            threshold_way: self.last,
+        };
+        (way > self.first && way < self.last).then_some(contact)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A clean touch: level, line with stiffness `k` from `corner` on, cut off at `limit`.
+    fn touch(level: f64, k: f64, corner: f64, limit: f64, noise: impl Fn(u32) -> f64) -> Trace {
+        let mut trace = Trace::default();
+        trace.start(1, 0.0, 1.0, 1.0);
+        for i in 0..1500 {
+            let way = 0.0005 * f64::from(i);
+            let torque = (level + k * (way - corner).max(0.0)).min(limit);
+            trace.add(way, torque + noise(i));
+            if torque >= limit {
+                break;
+            }
+        }
+        trace
+    }
+
+    fn fitted(trace: &Trace, threshold: f64) -> Option<Contact> {
+        let mut fit = Fit::default();
+        fit.start(0.1, 0.6, threshold);
+        let mut slices = 0;
+        while !fit.slice(trace) {
+            slices += 1;
+            assert!(slices < Fit::slices_bound());
+        }
+        fit.found()
+    }
+
+    proptest! {
+        /// Without noise the corner is found whatever level, stiffness and limit are.
+        #[test]
+        fn corner_of_a_clean_touch(level in -2.0..3.0f64, k in 20.0..300.0f64, corner in 0.2..0.4f64, limit in 4.5..9.0f64) {
+            let contact = fitted(&touch(level, k, corner, limit, |_| 0.0), 0.9 * limit).unwrap();
+            prop_assert!((contact.way - corner).abs() < 2e-5, "{} of {corner}", contact.way);
+            prop_assert!((contact.stiffness / k - 1.0).abs() < 1e-3 && (contact.level - level).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn no_stop_is_no_contact() {
+        let hash = |i: u32| f64::from(i.wrapping_mul(2_654_435_761) >> 16) / 65536.0 - 0.5;
+        assert_eq!(fitted(&touch(2.0, 0.0, 0.3, 9.0, hash), 8.0), None);
+        assert_eq!(fitted(&Trace::default(), 8.0), None);
+    }
+
+    #[test]
+    fn a_falling_line_is_no_contact() {
+        assert_eq!(fitted(&touch(2.0, -60.0, 0.3, 9.0, |i| 1e-3 * f64::from(i % 3)), 8.0), None);
+    }
+}

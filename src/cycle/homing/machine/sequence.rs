@@ -1,0 +1,458 @@
+//! The steps between the states: what begins, what a pressed axis leads to, how it ends well and how it ends ill.
+
+use super::*;
+
+impl Homing {
+    /// One cycle of the other states under way.
+    #[inline(always)]
+    pub(super) fn advance(&mut self, input: &HomingInput) {
+        match self.phase {
+            Phase::Begin => self.begin(input),
+            Phase::Limit => {
+                if self.confirmed(input) {
+                    self.event(GIB_HOMING_EVENT_APPROACH);
+                    self.start_touch();
+                }
+            }
+            Phase::Retract => {
+                let back = self.follow();
+                if self.phase == Phase::Retract && self.fitted() && back {
+                    self.retracted();
+                }
+            }
+            Phase::Clear => {
+                if self.confirmed(input) {
+                    self.event(GIB_HOMING_EVENT_CLEAR_ACKNOWLEDGED);
+                    self.cleared();
+                }
+            }
+            Phase::Evaluate => {
+                if self.fitted() {
+                    self.conclude();
+                }
+            }
+            Phase::Offset => {
+                if self.follow() {
+                    self.set();
+                }
+            }
+            Phase::Set => {
+                if self.confirmed(input) {
+                    self.changed = false;
+                    self.event(GIB_HOMING_EVENT_HOMED);
+                    self.enter(Phase::Done, 0.0);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// A cycle on the way out: braking, unloading and restoring go on whatever the input says.
+    pub(super) fn exit(&mut self, input: &HomingInput) {
+        self.now += 1;
+        for (i, side) in self.sides.iter_mut().enumerate().take(self.plan.motors) {
+            if input.position_mm[i].is_finite() && input.torque[i].is_finite() {
+                side.sense(&self.plan, input.position_mm[i], input.torque[i]);
+            }
+        }
+        if self.now >= self.deadline {
+            self.overdue_exit();
+        } else if self.phase == Phase::Restore {
+            if self.confirmed(input) {
+                self.changed = false;
+                self.fail();
+            }
+        } else {
+            match self.phase {
+                Phase::Stopping if self.stopped => self.unload(),
+                Phase::Stopping => self.stopped = self.arrived(),
+                Phase::Unload => self.unloading(),
+                _ => self.relieving(),
+            }
+        }
+        self.command();
+    }
+
+    #[cold]
+    fn overdue_exit(&mut self) {
+        match self.phase {
+            Phase::Restore => self.give_up(),
+            Phase::Unload => self.relieve(),
+            _ => self.restore(),
+        }
+    }
+
+    /// One cycle off the stop. Ends where the command ends and the axis has followed.
+    fn unloading(&mut self) {
+        let back = self.arrived();
+        if back && self.sides.iter().take(self.plan.motors).all(|side| side.settled(&self.plan)) {
+            self.restore();
+        }
+    }
+
+    /// The axis did not follow, something holds it: the servo must not go on pulling once it has its full torque. A
+    /// torque sensor at fault cannot tell.
+    fn relieve(&mut self) {
+        if matches!(self.fault.code, GIB_ERR_HOMING_TORQUE_STUCK | GIB_ERR_HOMING_TORQUE_SIGN) {
+            return self.restore();
+        }
+        self.enter(Phase::Relieve, f64::from(self.plan.ack_timeout));
+    }
+
+    fn relieving(&mut self) {
+        let mut all = true;
+        for side in self.sides.iter_mut().take(self.plan.motors) {
+            all &= side.relieve(&self.plan);
+        }
+        if all {
+            self.restore();
+        }
+    }
+
+    /// Advances the commands; true when all have arrived.
+    fn arrived(&mut self) -> bool {
+        let mut all = true;
+        for side in self.sides.iter_mut().take(self.plan.motors) {
+            all &= side.profile.step();
+        }
+        all
+    }
+
+    /// Advances the commands with an eye on encoder and torque; true when all have arrived.
+    #[inline(always)]
+    fn follow(&mut self) -> bool {
+        let mut all = true;
+        for side in self.sides.iter_mut().take(self.plan.motors) {
+            match side.follow(&self.plan) {
+                Touch::Going => all = false,
+                Touch::Arrived => {}
+                odd => {
+                    self.untouched(odd);
+                    return false;
+                }
+            }
+        }
+        all
+    }
+
+    /// One slice of the evaluation of the last touch; true when it is done for all motors.
+    #[inline(always)]
+    fn fitted(&mut self) -> bool {
+        if self.fitting >= self.plan.motors.min(2) {
+            return true;
+        }
+        if self.fit.slice(&self.sides[self.fitting & 1].trace) {
+            self.fitted_side();
+        }
+        false
+    }
+
+    #[cold]
+    fn fitted_side(&mut self) {
+        let i = self.fitting & 1;
+        let side = &self.sides[i];
+        let offset = self.plan.sense * (side.origin - side.start);
+        if let Err(fault) = self.touches[i].add(&self.plan, self.touch, &self.fit, offset) {
+            // On the way back it may still show that a tight spot is to blame.
+            if self.phase != Phase::Retract {
+                return self.leave(fault);
+            }
+            self.suspect = if self.suspect == Fault::NONE { fault } else { self.suspect };
+        }
+        self.fitting += 1;
+        self.quick = self.plan.motors == 1;
+        if self.fitting < self.plan.motors {
+            self.evaluate(self.fitting);
+        }
+    }
+
+    /// Begins the evaluation of a motor's last touch.
+    fn evaluate(&mut self, motor: usize) {
+        self.fitting = motor;
+        let side = &self.sides[motor & 1];
+        let way = self.plan.sense * (side.position - side.origin);
+        self.fit.start(way - self.plan.window(), self.plan.window(), self.plan.threshold);
+    }
+
+    #[cold]
+    fn begin(&mut self, input: &HomingInput) {
+        if !input.torque_limit.is_finite() {
+            let field = "torque_limit\0";
+            let fault = Fault { code: GIB_ERR_NON_FINITE, field, value: input.torque_limit, ..Fault::NONE };
+            return self.leave(fault);
+        }
+        for (side, position) in self.sides.iter_mut().zip(input.position_mm) {
+            side.begin(&self.plan, position);
+        }
+        self.old_limit = input.torque_limit;
+        self.changed = true;
+        self.request(GIB_HOMING_REQUEST_TORQUE_LIMIT, self.plan.limit);
+        self.enter(Phase::Limit, f64::from(self.plan.ack_timeout));
+    }
+
+    /// Begins the next touch. All but the first end soon behind the stop found before.
+    #[cold]
+    fn start_touch(&mut self) {
+        let plan = &self.plan;
+        let speed = if self.touch == 0 { plan.approach } else { plan.touch };
+        for side in self.sides.iter_mut().take(plan.motors) {
+            let beyond = side.travel(plan) + plan.retract + plan.press_max + plan.lag_limit;
+            let reach = if self.touch == 0 { plan.reach() } else { beyond.min(plan.reach()) };
+            side.start_touch(plan, speed, reach);
+        }
+        self.enter(Phase::Touch, f64::from(u32::MAX));
+    }
+
+    /// A touch that ended without a stop.
+    #[cold]
+    pub(super) fn untouched(&mut self, odd: Touch) {
+        let plan = self.plan;
+        let (mut way, mut fault) = (0f64, Fault::NONE);
+        for side in self.sides.iter().take(plan.motors) {
+            way = way.max(side.travel(&plan));
+            let first = odd == Touch::Broken && fault == Fault::NONE && side.rigid(&plan);
+            fault = if first { side.broken_sensor(&plan) } else { fault };
+        }
+        if fault == Fault::NONE {
+            let (code, field, high) = (GIB_ERR_HOMING_NO_STOP, "distance_max_mm\0", plan.distance[1]);
+            fault = Fault { code, field, value: way, low: 0.0, high };
+        }
+        if fault.code == GIB_ERR_HOMING_NO_STOP && self.touch > 0 {
+            fault.code = GIB_ERR_HOMING_TOUCHES; // it was there the first time
+        }
+        self.leave(fault);
+    }
+
+    /// Way to the stop of motor 1 minus that of motor 2.
+    pub(super) fn skew(&self) -> f64 {
+        if self.plan.motors == 2 { self.touches[0].contact() - self.touches[1].contact() } else { 0.0 }
+    }
+
+    /// Gantry: how far apart the two sides have gone since the start.
+    #[inline(always)]
+    pub(super) fn check_square(&mut self) {
+        let apart = self.sides[0].travel(&self.plan) - self.sides[1].travel(&self.plan);
+        if apart.abs() > self.plan.square {
+            self.askew(apart);
+        }
+    }
+
+    #[cold]
+    fn askew(&mut self, apart: f64) {
+        let (code, field, high) = (GIB_ERR_HOMING_SQUARE, "square_tolerance_mm\0", self.plan.square);
+        self.leave(Fault { code, field, value: apart, low: -high, high });
+    }
+
+    /// Every motor has pressed for the detection time.
+    #[cold]
+    pub(super) fn pressed(&mut self) {
+        let plan = self.plan;
+        if self.touch == 0 {
+            let way = self.sides.iter().take(plan.motors).map(|side| side.travel(&plan)).fold(f64::INFINITY, f64::min);
+            let early = |code, low| Fault { code, field: "distance_min_mm\0", value: way, low, high: plan.distance[1] };
+            if way < plan.retract {
+                return self.leave(early(GIB_ERR_HOMING_ON_STOP, plan.retract));
+            }
+            if way < plan.distance[0] {
+                return self.leave(early(GIB_ERR_HOMING_EARLY, plan.distance[0]));
+            }
+            self.event(GIB_HOMING_EVENT_LIMITING);
+        }
+        self.evaluate(0);
+        if self.touch < plan.touches {
+            let mut bound = 0f64;
+            for side in self.sides.iter_mut().take(plan.motors) {
+                bound = bound.max(side.go(&plan, side.position - plan.sense * plan.retract, plan.approach));
+            }
+            return self.enter(Phase::Retract, bound + 2.0 * f64::from(Fit::slices_bound()));
+        }
+        // The command and the request to drop the undone way come in one cycle: to the kernel it is no motion.
+        self.sides.iter_mut().take(plan.motors).for_each(|side| side.clear_lag(&plan));
+        if plan.clear_by_request {
+            self.event(GIB_HOMING_EVENT_CLEAR_REQUESTED);
+            self.request(GIB_HOMING_REQUEST_CLEAR_DEVIATION, plan.limit);
+            self.enter(Phase::Clear, f64::from(plan.ack_timeout));
+        } else {
+            self.cleared();
+        }
+    }
+
+    /// Back from a touch: was it a stop, which pushes the axis back, or a tight spot, which holds it both ways?
+    #[cold]
+    fn retracted(&mut self) {
+        let plan = self.plan;
+        for (side, touches) in self.sides.iter().zip(&self.touches).take(plan.motors) {
+            if let Some(fault) = side.held_back(&plan, touches.level()) {
+                return self.leave(fault);
+            }
+        }
+        if self.suspect != Fault::NONE {
+            return self.leave(self.suspect);
+        }
+        self.touch += 1;
+        self.start_touch();
+    }
+
+    /// The undone way is dropped: the command is where the axis is.
+    #[cold]
+    fn cleared(&mut self) {
+        self.event(GIB_HOMING_EVENT_CLEARED);
+        self.enter(Phase::Evaluate, 2.0 * f64::from(Fit::slices_bound()));
+    }
+
+    /// All touches are evaluated: do they agree, and where is home?
+    #[cold]
+    fn conclude(&mut self) {
+        if self.phase != Phase::Evaluate {
+            return; // left meanwhile
+        }
+        let plan = self.plan;
+        for i in 0..plan.motors.min(2) {
+            if let Err(fault) = self.touches[i].agree(&plan) {
+                return self.leave(fault);
+            }
+        }
+        let skew = self.skew();
+        if skew.abs() > plan.square {
+            return self.askew(skew);
+        }
+        let mut bound = 0f64;
+        for i in 0..plan.motors.min(2) {
+            let way = if plan.use_threshold { self.touches[i].threshold() } else { self.touches[i].contact() };
+            let home = self.sides[i].start + plan.sense * (way - plan.offset);
+            self.output.shift_mm[i] = plan.set_position - home;
+            bound = bound.max(self.sides[i].go(&plan, home, plan.offset_speed));
+        }
+        self.event(GIB_HOMING_EVENT_OFFSET);
+        self.enter(Phase::Offset, bound);
+    }
+
+    /// Off the stop: the coordinate is set and the old torque limit given back.
+    #[cold]
+    fn set(&mut self) {
+        self.request(GIB_HOMING_REQUEST_TORQUE_LIMIT | GIB_HOMING_REQUEST_SET_POSITION, self.old_limit);
+        self.enter(Phase::Set, f64::from(self.plan.ack_timeout));
+    }
+
+    /// The one door out: keeps the first fault, brakes, unloads, restores, fails.
+    #[cold]
+    pub(super) fn leave(&mut self, fault: Fault) {
+        if matches!(self.phase, Phase::Stopping | Phase::Unload | Phase::Relieve | Phase::Restore) {
+            return; // on the way out already
+        }
+        self.now = self.cycles(); // an abort comes between two cycles
+        self.sides.iter_mut().for_each(|side| side.look_ahead(&self.plan, 0));
+        self.fault = fault;
+        self.output.message = fault.code;
+        // Without a position to trust no move is safe; a faulted drive makes none.
+        let blind = matches!(fault.code, GIB_ERR_NON_FINITE | GIB_ERR_HOMING_ENCODER);
+        self.output.stop_drive = i32::from(blind);
+        if blind || matches!(fault.code, GIB_ERR_DRIVE_FAULT) || matches!(self.phase, Phase::Begin | Phase::Limit) {
+            self.sides.iter_mut().for_each(|side| side.clear_lag(&self.plan));
+            return self.restore();
+        }
+        let mut bound = 0f64;
+        for side in self.sides.iter_mut().take(self.plan.motors) {
+            side.profile.stop();
+            bound = bound.max(side.profile.cycles_bound());
+        }
+        self.stopped = false;
+        self.enter(Phase::Stopping, bound);
+    }
+
+    /// Standing: goes back from whatever was pressed on, by the way that pressing may have wound up.
+    #[cold]
+    fn unload(&mut self) {
+        let plan = self.plan;
+        let mut bound = 0f64;
+        for side in self.sides.iter_mut().take(plan.motors) {
+            let behind = plan.sense * (side.profile.position - side.position) > 0.1 * plan.press_max;
+            let loaded = side.pressing() || behind;
+            let goal = if loaded { side.position - plan.sense * plan.press_max } else { side.profile.position };
+            bound = bound.max(side.go(&plan, goal, plan.approach));
+        }
+        let settling = 4.0 * f64::from(plan.detection);
+        self.enter(Phase::Unload, bound + settling);
+    }
+
+    /// Last part of the door: gives the old torque limit back if it was changed.
+    fn restore(&mut self) {
+        if self.changed {
+            self.request(GIB_HOMING_REQUEST_TORQUE_LIMIT, self.old_limit);
+            self.enter(Phase::Restore, f64::from(self.plan.ack_timeout));
+        } else {
+            self.fail();
+        }
+    }
+
+    /// The restore was not confirmed in time. The request stays on the output.
+    fn give_up(&mut self) {
+        self.fail();
+        self.output.message = GIB_ERR_RESTORE_UNCONFIRMED;
+    }
+
+    fn fail(&mut self) {
+        self.enter(Phase::Failed, 0.0);
+        self.output.status = self.fault.code;
+    }
+
+    /// Asks the kernel for something; `limit` is the torque limit that shall be in force from then on.
+    fn request(&mut self, requests: u32, limit: f64) {
+        self.output.requests = requests;
+        self.output.torque_limit = limit;
+        self.output.request_id = self.output.request_id.wrapping_add(1).max(1);
+    }
+
+    /// True when the kernel has carried out the present request and the drive has the torque limit asked for. What
+    /// needs no acknowledgement counts as carried out.
+    #[inline(always)]
+    pub(super) fn confirmed(&self, input: &HomingInput) -> bool {
+        let wanted = self.output.requests & self.plan.acknowledged;
+        let limits = wanted & GIB_HOMING_REQUEST_TORQUE_LIMIT != 0;
+        wanted == 0
+            || (input.acknowledged_id == self.output.request_id
+                && (!limits
+                    || (input.torque_limit - self.output.torque_limit).abs() <= 0.01 * self.output.torque_limit.abs()))
+    }
+
+    /// Tells an event, once.
+    pub(super) fn event(&mut self, event: u32) {
+        self.output.new_events |= event & !self.output.events;
+        self.output.events |= event;
+    }
+
+    /// Goes to a state that must end within `cycles`, and within the time limit unless it is on the way out.
+    pub(super) fn enter(&mut self, phase: Phase, cycles: f64) {
+        self.phase = phase;
+        self.quick = self.plan.motors == 1
+            && (matches!(phase, Phase::Touch | Phase::Offset) || (phase == Phase::Retract && self.fitting > 0));
+        let out = matches!(phase, Phase::Stopping | Phase::Unload | Phase::Relieve | Phase::Restore);
+        let last = if out { u32::MAX } else { self.end };
+        self.deadline = self.now.saturating_add((cycles + 1.0) as u32).min(last);
+        self.output.phase = match phase {
+            Phase::Idle => GIB_HOMING_IDLE,
+            Phase::Begin | Phase::Limit => GIB_HOMING_LIMIT,
+            Phase::Touch => GIB_HOMING_TOUCH,
+            Phase::Retract => GIB_HOMING_RETRACT,
+            Phase::Clear => GIB_HOMING_CLEAR,
+            Phase::Evaluate => GIB_HOMING_EVALUATE,
+            Phase::Offset => GIB_HOMING_OFFSET,
+            Phase::Set => GIB_HOMING_SET,
+            Phase::Stopping => GIB_HOMING_STOPPING,
+            Phase::Unload | Phase::Relieve => GIB_HOMING_UNLOAD,
+            Phase::Restore => GIB_HOMING_RESTORE,
+            Phase::Done => GIB_HOMING_DONE,
+            Phase::Failed => GIB_HOMING_FAILED,
+        };
+        let resting = matches!(phase, Phase::Idle | Phase::Done | Phase::Failed);
+        self.output.owns_motion = i32::from(!resting && phase != Phase::Begin);
+        if resting {
+            self.output.target_speed_mm_s = [0.0; 2];
+        }
+        self.output.status = match phase {
+            Phase::Idle => GIB_OK,
+            Phase::Done => GIB_DONE,
+            _ => GIB_BUSY,
+        };
+    }
+}

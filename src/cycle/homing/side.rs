@@ -1,0 +1,354 @@
+//! One motor on its way to the stop: what it is commanded, and whether it presses, stands, or cannot be trusted.
+//!
+//! Acceleration torque, a tight spot and noise are not a stop: the filtered torque must be at the limit while the
+//! position stays within a small way for the whole detection time.
+
+use super::plan::{Plan, STUCK_BLOCKS};
+use super::trace::Trace;
+use crate::cycle::profile::Profile;
+use crate::error::*;
+
+/// Share of a new sample in the filtered torque: eight cycles.
+pub const GAIN: f64 = 0.125;
+/// Change of torque, as a share of the limit, that no standing encoder explains: a stop gives way by some counts of
+/// the encoder. After a turn, friction on the motor's side may hold the motor while its torque changes sense.
+const RIGID: f64 = 0.3;
+const RIGID_AFTER_TURN: f64 = 0.8;
+/// Share of the limit at which the torque counts as off, and how steeply the command answers to more.
+const RELIEVED: f64 = 0.2;
+const RELIEF: f64 = 5.0;
+
+/// How a touch stands after a cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Touch {
+    /// On the way.
+    Going,
+    /// The torque is at the limit.
+    Held,
+    /// It has been for the detection time, at a stand.
+    Pressed,
+    /// The command is at its goal and nothing was touched.
+    Arrived,
+    /// The sensors contradict each other.
+    Broken,
+}
+
+/// One motor: plain data.
+#[derive(Debug, Clone, Default)]
+pub struct Side {
+    /// The command.
+    pub profile: Profile,
+    /// Cycles for which the command surely goes on at its speed, far from any bound of way and time.
+    cruise: u32,
+    granted: u32,
+    /// Where homing began, mm.
+    pub start: f64,
+    /// Where the present touch began, mm.
+    pub origin: f64,
+    /// Where the present move began, mm.
+    from: f64,
+    /// Last measured position, mm.
+    pub position: f64,
+    /// Torque toward the stop, filtered.
+    pub filtered: f64,
+    /// Lowest of it on the way back.
+    pub lowest: f64,
+    /// The torque as it was read last.
+    reading: f64,
+    /// Cycles since the position changed, how many are too many, and the torque when it last changed.
+    frozen: u32,
+    frozen_limit: u32,
+    free: [f64; 2],
+    /// Torque at which `held` changes.
+    trip: f64,
+    held: bool,
+    /// Something was pressed on and has not been left since.
+    pressing: bool,
+    anchor: f64,
+    standing: u32,
+    /// Torque against way of the present touch.
+    pub trace: Trace,
+}
+
+impl Side {
+    /// The axis stands at `position`.
+    pub fn begin(&mut self, plan: &Plan, position: f64) {
+        self.profile = Profile::at_rest(position, plan.acceleration);
+        self.start = position;
+        self.position = position;
+        self.filtered = 0.0;
+    }
+
+    /// Way gone toward the stop since the start.
+    #[must_use]
+    pub fn travel(&self, plan: &Plan) -> f64 {
+        plan.sense * (self.position - self.start)
+    }
+
+    /// Begins a touch at `speed` (mm per cycle) that ends `reach` from the start at the latest.
+    pub fn start_touch(&mut self, plan: &Plan, speed: f64, reach: f64) {
+        self.origin = self.position;
+        self.from = self.position;
+        self.profile.go(self.start + plan.sense * reach, speed);
+        self.trace.start(plan.block(speed), self.position, plan.sense, plan.torque_sense);
+        self.frozen = 0;
+        self.frozen_limit = plan.frozen(speed);
+        self.free = [self.reading, self.filtered];
+        self.held = false;
+        self.pressing = false;
+        self.trip = plan.threshold;
+        self.standing = 0;
+    }
+
+    /// Whether this cycle's readings are within all bounds.
+    #[inline(always)]
+    pub fn safe(&self, plan: &Plan, position: f64, torque: f64) -> bool {
+        (self.profile.position - position).abs() <= plan.lag_limit
+            && (position - self.position).abs() <= plan.jump
+            && plan.sense * (position - self.start) <= plan.distance[1]
+            && torque.is_finite()
+            && self.filtered.abs() <= plan.bound
+    }
+
+    /// Which bound is broken.
+    #[cold]
+    pub fn name_danger(&self, plan: &Plan, position: f64, torque: f64) -> Fault {
+        let fault = |code, field, value, low, high| Fault { code, field, value, low, high };
+        for (field, value) in [("position_mm\0", position), ("torque\0", torque)] {
+            if !value.is_finite() {
+                return fault(GIB_ERR_NON_FINITE, field, value, f64::MIN, f64::MAX);
+            }
+        }
+        let lag = self.profile.position - position;
+        if self.filtered.abs() > plan.bound {
+            // A bound three standard deviations off was broken by the sensor, not by the drive.
+            let code = if self.noisy(plan) { GIB_ERR_HOMING_NOISE } else { GIB_ERR_TORQUE_BOUND };
+            fault(code, "torque\0", torque, -plan.bound, plan.bound)
+        } else if (position - self.position).abs() > plan.jump {
+            fault(GIB_ERR_HOMING_ENCODER, "position_mm\0", position - self.position, -plan.jump, plan.jump)
+        } else if lag.abs() > plan.lag_limit {
+            self.contradiction(plan, fault(GIB_ERR_LAG, "position_mm\0", lag, -plan.lag_limit, plan.lag_limit))
+        } else {
+            let way = plan.sense * (position - self.start);
+            fault(GIB_ERR_TRAVEL_BOUND, "position_mm\0", way, 0.0, plan.distance[1])
+        }
+    }
+
+    /// The axis does not follow: the torque sensor's fault if it says that nothing holds the axis, a tight spot if it
+    /// is held on the way back.
+    fn contradiction(&self, plan: &Plan, otherwise: Fault) -> Fault {
+        if self.back(plan) && self.filtered < -0.5 * plan.threshold {
+            let (code, field) = (GIB_ERR_HOMING_TIGHT_SPOT, "torque\0");
+            return Fault { code, field, value: self.filtered, low: 0.0, high: plan.limit };
+        }
+        self.torque_fault(plan).unwrap_or(otherwise)
+    }
+
+    /// Which sensor is to blame for a touch or move that is [`Touch::Broken`].
+    #[cold]
+    pub fn broken_sensor(&self, plan: &Plan) -> Fault {
+        if 3.0 * self.trace.noise() > RIGID * plan.limit {
+            return Fault { value: self.reading, field: "torque\0", ..Fault::of(GIB_ERR_HOMING_NOISE) };
+        }
+        let encoder = Fault { field: "position_mm\0", value: self.position, ..Fault::of(GIB_ERR_HOMING_ENCODER) };
+        self.torque_fault(plan).unwrap_or(encoder)
+    }
+
+    /// What is wrong with the torque of an axis that stands against its command, if anything.
+    fn torque_fault(&self, plan: &Plan) -> Option<Fault> {
+        let fault = |code, field, value| Some(Fault { code, field, value, low: 0.0, high: plan.limit });
+        if self.trace.stuck(STUCK_BLOCKS) {
+            fault(GIB_ERR_HOMING_TORQUE_STUCK, "torque\0", self.reading)
+        } else if self.filtered < -0.5 * plan.threshold && !self.back(plan) {
+            fault(GIB_ERR_HOMING_TORQUE_SIGN, "torque_inverted\0", self.filtered)
+        } else {
+            None
+        }
+    }
+
+    /// Whether the command leads away from the stop.
+    fn back(&self, plan: &Plan) -> bool {
+        plan.sense * (self.profile.position + self.profile.left() - self.position) < 0.0
+    }
+
+    /// Whether the torque tolerance is less than three standard deviations of a reading.
+    fn noisy(&self, plan: &Plan) -> bool {
+        3.0 * self.trace.noise() > plan.bound - plan.limit
+    }
+
+    /// Takes in a cycle's readings.
+    #[inline(always)]
+    pub fn sense(&mut self, plan: &Plan, position: f64, torque: f64) {
+        if self.frozen == 0 {
+            self.free = [self.reading, self.filtered];
+        }
+        self.filtered += GAIN * (plan.torque_sense * torque - self.filtered);
+        self.reading = torque;
+        if position == self.position {
+            self.frozen = self.frozen.saturating_add(1);
+        } else {
+            self.frozen = 0;
+        }
+        self.position = position;
+    }
+
+    /// One cycle in a few instructions, for one that is like the one before: at constant speed, encoder and torque
+    /// alive, all within bounds. False when it is not; nothing has changed then. The bounds are those of [`Side::safe`];
+    /// those of way and time are in `cruise`.
+    #[inline(always)]
+    pub fn quick(&mut self, plan: &Plan, position: f64, torque: f64) -> bool {
+        let filtered = (1.0 - GAIN) * self.filtered + plan.torque_share * torque;
+        let moved = (position - self.position).abs();
+        // Written so that a NaN is not usual.
+        let usual = self.cruise != 0
+            && (self.profile.position - position).abs() <= plan.lag_limit
+            && moved <= plan.jump
+            && moved > 0.0
+            && filtered > plan.bound_below
+            && filtered < self.trip;
+        if !usual {
+            return false;
+        }
+        self.cruise -= 1;
+        self.filtered = filtered;
+        self.reading = torque;
+        self.position = position;
+        self.trace.add(position, torque);
+        self.profile.position += self.profile.speed;
+        true
+    }
+
+    /// Cycles that went by in [`Side::quick`] since the last [`Side::look_ahead`].
+    #[must_use]
+    pub fn quick_cycles(&self) -> u32 {
+        self.granted - self.cruise
+    }
+
+    /// Counts the cycles for which [`Side::quick`] may go on, at most `left`.
+    pub fn look_ahead(&mut self, plan: &Plan, left: u32) {
+        let p = &self.profile;
+        (self.cruise, self.granted) = (0, 0);
+        if !p.cruises() || self.held || self.frozen > 0 {
+            return;
+        }
+        // The command brakes over v·(v + a)/(2a), and the axis may lead it by the largest lag.
+        let (way, speed) = (p.left().abs(), p.speed.abs());
+        let braking = speed * (speed + plan.acceleration) / (2.0 * plan.acceleration) + 4.0 * speed;
+        let to_end = plan.distance[1] - plan.lag_limit - plan.sense * (p.position - self.start);
+        let free = if p.speed * plan.sense > 0.0 { to_end.min(way - braking) } else { way - braking };
+        self.granted = ((free / speed).max(0.0) as u32).min(left);
+        self.cruise = self.granted;
+    }
+
+    /// One cycle of a touch, after [`Side::sense`].
+    #[inline(always)]
+    pub fn touch(&mut self, plan: &Plan) -> Touch {
+        if self.frozen > 0 && self.rigid(plan) {
+            return Touch::Broken;
+        }
+        if self.filtered >= self.trip {
+            return self.press(plan);
+        }
+        if self.held {
+            self.held = false;
+            self.pressing = false;
+            self.trip = plan.threshold;
+        }
+        self.trace.add(self.position, self.reading);
+        if self.profile.step() { Touch::Arrived } else { Touch::Going }
+    }
+
+    /// The encoder stands. Whether it should not: the command has gone on for long, or the torque has changed as on
+    /// something infinitely rigid. Both the reading and its filtered value must say so: one is noisy, one is late.
+    #[must_use]
+    pub fn rigid(&self, plan: &Plan) -> bool {
+        let under_way = (self.position - self.from).abs() > 0.25 * plan.retract;
+        let never_moved = self.position == self.start && self.filtered >= plan.threshold;
+        let share = if under_way { RIGID } else { RIGID_AFTER_TURN };
+        let most = share * plan.limit;
+        let changed = (self.reading - self.free[0]).abs() > most && (self.filtered - self.free[1]).abs() > 0.5 * most;
+        let long = under_way && self.frozen > self.frozen_limit && self.filtered.abs() < plan.release;
+        never_moved || changed || long
+    }
+
+    /// The torque is at the limit. The command goes on until the axis stands, so that an acceleration at the limit is
+    /// not broken off.
+    #[cold]
+    fn press(&mut self, plan: &Plan) -> Touch {
+        if !self.held {
+            self.held = true;
+            self.pressing = true;
+            self.trip = plan.release;
+            self.anchor = self.position;
+            self.standing = 0;
+        }
+        self.standing += 1;
+        if (self.position - self.anchor).abs() > plan.standing_way {
+            self.anchor = self.position;
+            self.standing = 0;
+        }
+        if self.standing < plan.hold {
+            self.profile.step();
+        } else {
+            self.profile.speed = 0.0;
+        }
+        if self.standing >= plan.detection { Touch::Pressed } else { Touch::Held }
+    }
+
+    /// Begins a move to `goal` and returns the cycles that it takes at most.
+    pub fn go(&mut self, plan: &Plan, goal: f64, speed: f64) -> f64 {
+        self.profile.go(goal, speed);
+        self.trip = plan.threshold;
+        self.held = false;
+        self.lowest = self.filtered;
+        self.from = self.position;
+        self.frozen = 0;
+        self.free = [self.reading, self.filtered];
+        self.profile.cycles_bound()
+    }
+
+    /// One cycle of a move, after [`Side::sense`]: arrived, going, or broken.
+    #[inline(always)]
+    pub fn follow(&mut self, plan: &Plan) -> Touch {
+        self.lowest = self.lowest.min(self.filtered);
+        if self.frozen > 0 && self.profile.speed != 0.0 && self.rigid(plan) {
+            return Touch::Broken;
+        }
+        if self.profile.step() { Touch::Arrived } else { Touch::Going }
+    }
+
+    /// One cycle of taking the torque off a motor that does not move: the command goes against the torque, the faster
+    /// the more there is, so that the servo's integral runs down. True when the torque is off.
+    pub fn relieve(&mut self, plan: &Plan) -> bool {
+        let off = self.filtered.abs() <= RELIEVED * plan.limit;
+        let speed = -plan.sense * plan.approach * (RELIEF * self.filtered / plan.limit).clamp(-1.0, 1.0);
+        self.profile = Profile::at_rest(self.profile.position + speed, plan.acceleration);
+        self.standing = if off { self.standing + 1 } else { 0 };
+        self.standing >= plan.hold
+    }
+
+    /// The axis is where its command is, nearly.
+    #[must_use]
+    pub fn settled(&self, plan: &Plan) -> bool {
+        (self.profile.position - self.position).abs() <= 0.1 * plan.press_max
+    }
+
+    /// Whether the axis was held on its way back as it was on its way in. `level`: torque before contact.
+    #[must_use]
+    pub fn held_back(&self, plan: &Plan, level: f64) -> Option<Fault> {
+        let (back, high) = (-self.lowest - level, 0.5 * (plan.threshold - level));
+        let fault = Fault { code: GIB_ERR_HOMING_TIGHT_SPOT, field: "torque\0", value: back, low: 0.0, high };
+        (back > high).then_some(fault)
+    }
+
+    /// Whether something is pressed on.
+    #[must_use]
+    pub fn pressing(&self) -> bool {
+        self.pressing
+    }
+
+    /// Drops the undone way: the command is where the axis is.
+    pub fn clear_lag(&mut self, plan: &Plan) {
+        self.profile = Profile::at_rest(self.position, plan.acceleration);
+    }
+}
