@@ -259,6 +259,71 @@
 #define GIB_ERR_PROGRAM_OWNER (-907)
 
 /**
+ * The axis stood on the stop when homing began, or closer than the retraction.
+ */
+#define GIB_ERR_HOMING_ON_STOP (-200)
+
+/**
+ * A stop was met before the smallest distance.
+ */
+#define GIB_ERR_HOMING_EARLY (-201)
+
+/**
+ * The largest distance was gone and no stop met.
+ */
+#define GIB_ERR_HOMING_NO_STOP (-202)
+
+/**
+ * Homing took longer than its time limit.
+ */
+#define GIB_ERR_HOMING_TIME_LIMIT (-203)
+
+/**
+ * The touches disagree: chips before the stop, a tight spot, or a slipping encoder.
+ */
+#define GIB_ERR_HOMING_TOUCHES (-204)
+
+/**
+ * The torque rises over a longer way than a dead stop allows.
+ */
+#define GIB_ERR_HOMING_SOFT_STOP (-205)
+
+/**
+ * What was pressed on also holds the axis on the way back: a tight spot, not a stop.
+ */
+#define GIB_ERR_HOMING_TIGHT_SPOT (-206)
+
+/**
+ * The torque against position is not a level and then a line.
+ */
+#define GIB_ERR_HOMING_SHAPE (-207)
+
+/**
+ * The torque is too noisy for the tolerance of the touches.
+ */
+#define GIB_ERR_HOMING_NOISE (-208)
+
+/**
+ * The axis stands against its command and the torque reading does not change: the torque sensor is stuck.
+ */
+#define GIB_ERR_HOMING_TORQUE_STUCK (-209)
+
+/**
+ * The axis stands and the torque points away from the stop: the torque's sign is inverted.
+ */
+#define GIB_ERR_HOMING_TORQUE_SIGN (-210)
+
+/**
+ * The encoder stands still while torque or command say that the motor moves, or it jumps.
+ */
+#define GIB_ERR_HOMING_ENCODER (-211)
+
+/**
+ * Gantry: the two sides are further apart than the square tolerance.
+ */
+#define GIB_ERR_HOMING_SQUARE (-212)
+
+/**
  * Slow-feed mode (default): the motor is fed slowly and the torque read in every cycle. The more accurate one.
  */
 #define GIB_BACKLASH_SLOW_FEED 0
@@ -369,6 +434,156 @@
 #define GIB_INPUT_ABORT 2
 
 /**
+ * Home position from the start of the torque–position line (default).
+ */
+#define GIB_HOMING_LINE 0
+
+/**
+ * Home position where the torque limit was reached, as published. Depends on limit, speed and stiffness.
+ */
+#define GIB_HOMING_THRESHOLD 1
+
+/**
+ * Clear the deviation by request: the kernel drops the undone way and acknowledges (default, as published).
+ */
+#define GIB_HOMING_CLEAR_DEVIATION 0
+
+/**
+ * Clear the deviation without the kernel: the command jumps to the actual position (instant lag reduction).
+ */
+#define GIB_HOMING_INSTANT_LAG_REDUCTION 1
+
+/**
+ * Positions in mm (default).
+ */
+#define GIB_POSITION_MM 0
+
+/**
+ * Positions in degrees: read every `mm` of this family as degree, every `um` as a thousandth of a degree.
+ */
+#define GIB_POSITION_DEG 1
+
+/**
+ * The axis stands; gib asks for nothing.
+ */
+#define GIB_HOMING_IDLE 0
+
+/**
+ * Waits until the torque limit is in force.
+ */
+#define GIB_HOMING_LIMIT 1
+
+/**
+ * Moves to the stop and presses.
+ */
+#define GIB_HOMING_TOUCH 2
+
+/**
+ * Goes back between two touches.
+ */
+#define GIB_HOMING_RETRACT 3
+
+/**
+ * Waits until the deviation is cleared.
+ */
+#define GIB_HOMING_CLEAR 4
+
+/**
+ * Stands while the last touch is evaluated in slices.
+ */
+#define GIB_HOMING_EVALUATE 5
+
+/**
+ * Moves off the stop by the zero offset.
+ */
+#define GIB_HOMING_OFFSET 6
+
+/**
+ * Waits until the position is set and the old torque limit in force.
+ */
+#define GIB_HOMING_SET 7
+
+/**
+ * Brakes before everything changed is restored.
+ */
+#define GIB_HOMING_STOPPING 8
+
+/**
+ * Takes the pressure off the stop.
+ */
+#define GIB_HOMING_UNLOAD 9
+
+/**
+ * Waits until the old torque limit is in force.
+ */
+#define GIB_HOMING_RESTORE 10
+
+/**
+ * Ended well.
+ */
+#define GIB_HOMING_DONE 11
+
+/**
+ * Ended with an error; kept until the next start.
+ */
+#define GIB_HOMING_FAILED 12
+
+/**
+ * Event: the way to the stop begins.
+ */
+#define GIB_HOMING_EVENT_APPROACH 1
+
+/**
+ * Event: the torque has risen to the limit, something is touched.
+ */
+#define GIB_HOMING_EVENT_CONTACT 2
+
+/**
+ * Event: torque limiting; the axis stood under it for the detection time.
+ */
+#define GIB_HOMING_EVENT_LIMITING 4
+
+/**
+ * Event: the kernel is asked to clear the deviation.
+ */
+#define GIB_HOMING_EVENT_CLEAR_REQUESTED 8
+
+/**
+ * Event: the kernel has acknowledged it.
+ */
+#define GIB_HOMING_EVENT_CLEAR_ACKNOWLEDGED 16
+
+/**
+ * Event: the command is where the axis is.
+ */
+#define GIB_HOMING_EVENT_CLEARED 32
+
+/**
+ * Event: the zero-offset move begins.
+ */
+#define GIB_HOMING_EVENT_OFFSET 64
+
+/**
+ * Event: homed.
+ */
+#define GIB_HOMING_EVENT_HOMED 128
+
+/**
+ * Request: put `torque_limit` in force in the drive.
+ */
+#define GIB_HOMING_REQUEST_TORQUE_LIMIT 1
+
+/**
+ * Request: drop the undone way, so that the kernel's command is the actual position.
+ */
+#define GIB_HOMING_REQUEST_CLEAR_DEVIATION 2
+
+/**
+ * Request: add `shift_mm` to the encoder's position: it becomes the machine coordinate.
+ */
+#define GIB_HOMING_REQUEST_SET_POSITION 4
+
+/**
  * Version of this interface: major · 65536 + minor.
  *
  * Within one major, functions, struct tails and status numbers are added and nothing is changed or taken away;
@@ -405,6 +620,11 @@
  * A lost-motion measurement of one axis. Opaque; its size is `gib_backlash_size()`.
  */
 typedef struct gib_backlash gib_backlash;
+
+/**
+ * Homing of one axis, of one motor or two. Opaque; its size is `gib_homing_size()`.
+ */
+typedef struct gib_homing gib_homing;
 
 /**
  * Reads and writes part programs, and keeps why the last call failed. Opaque; its size is `gib_program_size()`.
@@ -798,6 +1018,318 @@ typedef struct gib_error_detail {
 } gib_error_detail;
 
 /**
+ * How to home. Zero in a field means its default; fields marked "required" have none.
+ *
+ * The names are those of PLCopen's MC_HomeOnBlock and its vendors. Positions are motor positions in load units.
+ * Torque fields are in N·m whatever `torque_unit` says.
+ */
+typedef struct gib_homing_config {
+    /**
+     * Size of this struct as the caller knows it: `sizeof(gib_homing_config)`. Required.
+     */
+    uint32_t struct_size;
+    /**
+     * Toward the stop: +1 or -1. Required.
+     */
+    int32_t direction;
+    /**
+     * 1: one motor (default). 2: a gantry, each motor with a stop of its own.
+     */
+    int32_t motors;
+    /**
+     * `GIB_HOMING_LINE` (default) or `GIB_HOMING_THRESHOLD`: which is the home position. Both are reported.
+     */
+    int32_t method;
+    /**
+     * `GIB_POSITION_MM` (default) or `GIB_POSITION_DEG`.
+     */
+    int32_t position_unit;
+    /**
+     * Unit of the torque input: `GIB_TORQUE_NM` (default) or `GIB_TORQUE_PERMILLE` of `rated_torque_nm`.
+     */
+    int32_t torque_unit;
+    /**
+     * 1: the drive's torque is negative toward positive positions (torque polarity inverted). 0 (default): not.
+     */
+    int32_t torque_inverted;
+    /**
+     * `GIB_HOMING_CLEAR_DEVIATION` (default) or `GIB_HOMING_INSTANT_LAG_REDUCTION`.
+     */
+    int32_t lag_reduction;
+    /**
+     * Touches that are measured, 1 to 10 (default 3), after a first one that only finds the stop.
+     */
+    int32_t touches;
+    /**
+     * Requests that the kernel carries out without acknowledging: a sum of `GIB_HOMING_REQUEST_…` (default 0: it
+     * acknowledges all).
+     */
+    uint32_t unacknowledged;
+    /**
+     * Servo period, 0.00005 to 0.02 s. Required.
+     */
+    double cycle_s;
+    /**
+     * Speed on the way to the stop, 0.01 to 100 mm/s (default 1).
+     */
+    double approach_speed_mm_s;
+    /**
+     * Speed of the measured touches, 0.01 mm/s to the approach speed (default: the approach speed, at most 1).
+     */
+    double touch_speed_mm_s;
+    /**
+     * Largest commanded acceleration, 0.1 to 10000 mm/s² (default 50).
+     */
+    double acceleration_mm_s2;
+    /**
+     * Torque limit that the drive shall have in force until homing ends, N·m. Required.
+     */
+    double torque_limit_nm;
+    /**
+     * The torque counts as limiting within this of the limit, and beyond the limit by this it is a fault, N·m;
+     * 1 to 30 % of the limit (default 10 %).
+     */
+    double torque_tolerance_nm;
+    /**
+     * The axis stands when slower than this, mm/s (default a fifth of the touch speed, 0.05 at least).
+     */
+    double detection_velocity_mm_s;
+    /**
+     * Time for which the torque must be limiting and the axis stand, 8 cycles to 5 s (default 0.1).
+     */
+    double detection_time_s;
+    /**
+     * Smallest way to the stop, mm (default 0): a stop before it is a fault.
+     */
+    double distance_min_mm;
+    /**
+     * Largest way that the axis may go toward the stop, mm. Required.
+     */
+    double distance_max_mm;
+    /**
+     * Time for the whole homing, s (default: what its ways take, twice, and 10 s).
+     */
+    double time_limit_s;
+    /**
+     * Largest |target - position|, up to 100 mm (default 1 mm and the way of 0.1 s).
+     */
+    double lag_limit_mm;
+    /**
+     * Coordinate of the place where the axis stands when homed, mm.
+     */
+    double set_position_mm;
+    /**
+     * Way from the contact point to that place, away from the stop, up to 1000 mm.
+     */
+    double zero_offset_mm;
+    /**
+     * Speed of that move, 0.01 to 500 mm/s (default: the approach speed).
+     */
+    double zero_offset_speed_mm_s;
+    /**
+     * Way back from the stop between touches, 0.05 to 100 mm (default 1). More than twice the lost motion.
+     */
+    double retract_mm;
+    /**
+     * Largest way from contact to the torque limit, up to 0.4 of the retraction (default): more is a soft stop.
+     */
+    double press_max_mm;
+    /**
+     * Touches may differ by this, 0.1 to 1000 µm (default 5), besides their own uncertainty.
+     */
+    double touch_tolerance_um;
+    /**
+     * Gantry: largest difference of the two sides, mm (default 0.2).
+     */
+    double square_tolerance_mm;
+    /**
+     * Time within which a request must be acknowledged, 2 cycles to 60 s (default 1).
+     */
+    double ack_timeout_s;
+    /**
+     * Rated torque, N·m. Required for `GIB_TORQUE_PERMILLE`.
+     */
+    double rated_torque_nm;
+} gib_homing_config;
+/**
+ * Size of the struct in the first published ABI.
+ */
+#define gib_homing_config_FIRST_SIZE 208
+
+/**
+ * What the kernel tells gib in a cycle. Arrays: motor 1, motor 2; the second only matters for a gantry.
+ */
+typedef struct gib_homing_input {
+    /**
+     * Motor position in load units, mm, in the coordinate of the start until GIB_DONE.
+     */
+    double position_mm[2];
+    /**
+     * Motor torque, positive toward positive positions unless `torque_inverted`, in the unit of the configuration.
+     */
+    double torque[2];
+    /**
+     * Torque limit in force in the drive now, in the unit of `torque`.
+     */
+    double torque_limit;
+    /**
+     * `request_id` of the last request that the kernel has carried out; 0 before the first.
+     */
+    uint32_t acknowledged_id;
+    /**
+     * `GIB_INPUT_FAULT` (also after a following-error trip), `GIB_INPUT_ABORT`; other bits must be 0.
+     */
+    uint32_t flags;
+} gib_homing_input;
+
+/**
+ * What gib asks of the kernel in a cycle. Always written, and safe, also when the call returns an error.
+ */
+typedef struct gib_homing_output {
+    /**
+     * Commanded motor positions, mm. To be followed while `owns_motion` is 1.
+     */
+    double target_position_mm[2];
+    /**
+     * Commanded speeds, mm/s, signed.
+     */
+    double target_speed_mm_s[2];
+    /**
+     * To add to each encoder position to have machine coordinates, mm. Valid with the request to set the position.
+     */
+    double shift_mm[2];
+    /**
+     * Torque limit that the drive shall have, in the unit of the input. Valid once `request_id` is not 0.
+     */
+    double torque_limit;
+    /**
+     * What the step returned: `GIB_OK`, `GIB_BUSY`, `GIB_DONE` or the first error.
+     */
+    int32_t status;
+    /**
+     * One of the `GIB_HOMING_…` phases.
+     */
+    int32_t phase;
+    /**
+     * Message number: 0, or the error to tell the operator about; its text is `gib_status_text`.
+     */
+    int32_t message;
+    /**
+     * 1 while gib commands the axis, else 0.
+     */
+    int32_t owns_motion;
+    /**
+     * `GIB_HOMING_EVENT_…` that happened so far in this homing; each happens once, in the order of the numbers.
+     */
+    uint32_t events;
+    /**
+     * Those of this cycle.
+     */
+    uint32_t new_events;
+    /**
+     * `GIB_HOMING_REQUEST_…` that the present request asks for.
+     */
+    uint32_t requests;
+    /**
+     * Number of the present request: when it changes, carry out `requests`, then give the number back in
+     * `acknowledged_id`. 0: no request was made yet.
+     */
+    uint32_t request_id;
+    /**
+     * 1: position or drive cannot be trusted; take the torque off the motor and brake it, until the next start.
+     */
+    int32_t stop_drive;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
+} gib_homing_output;
+
+/**
+ * What a homing found on one motor. Lengths in mm and µm, torque in N·m.
+ */
+typedef struct gib_homing_side {
+    /**
+     * Contact point, mean of the measured touches, in the coordinate of the start, mm.
+     */
+    double contact_mm;
+    /**
+     * Its expanded uncertainty, k = 2, µm.
+     */
+    double uncertainty_um;
+    /**
+     * Largest minus smallest contact point of the measured touches, µm.
+     */
+    double spread_um;
+    /**
+     * Where the plain threshold puts the stop, mean of the measured touches, mm.
+     */
+    double threshold_mm;
+    /**
+     * Way from the contact point to the torque limit, µm.
+     */
+    double press_um;
+    /**
+     * Stiffness of drive and stop in series, N·m/mm.
+     */
+    double stiffness_nm_mm;
+    /**
+     * Torque before contact, toward the stop, N·m.
+     */
+    double sliding_nm;
+    /**
+     * Standard deviation of the torque about level and line, N·m.
+     */
+    double noise_nm;
+    /**
+     * Add this to the encoder's position to have the machine coordinate, mm.
+     */
+    double shift_mm;
+} gib_homing_side;
+
+/**
+ * What a homing found and what became of it.
+ */
+typedef struct gib_homing_report {
+    /**
+     * Motor 1, motor 2; the second is all zero without a gantry.
+     */
+    struct gib_homing_side side[2];
+    /**
+     * Gantry: way to the stop of motor 1 minus that of motor 2, mm.
+     */
+    double skew_mm;
+    /**
+     * Torque limit in force when homing began, in the unit of the input.
+     */
+    double old_torque_limit;
+    /**
+     * `GIB_DONE`, `GIB_BUSY`, `GIB_OK` before a start, or the first error.
+     */
+    int32_t status;
+    /**
+     * `GIB_HOMING_LINE` or `GIB_HOMING_THRESHOLD`.
+     */
+    int32_t method;
+    /**
+     * Measured touches so far.
+     */
+    int32_t touches;
+    /**
+     * Cycles since the start.
+     */
+    int32_t cycles;
+    /**
+     * 1 while the kernel owes the restored torque limit.
+     */
+    int32_t restore_owed;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
+} gib_homing_report;
+
+/**
  * All functions of the library, each named as in this header without its `gib_`.
  *
  * Get it from `gib_api`. A member whose offset is not below `struct_size` is not in this library.
@@ -925,6 +1457,44 @@ typedef struct gib_api_table {
      * See gib_program_last_error_text.
      */
     int32_t (*program_last_error_text)(const struct gib_program *handle, char *text, uintptr_t size);
+    /**
+     * See gib_homing_size.
+     */
+    uintptr_t (*homing_size)(void);
+    /**
+     * See gib_homing_init_in.
+     */
+    int32_t (*homing_init_in)(void *memory, uintptr_t size, struct gib_homing **out);
+    /**
+     * See gib_homing_new.
+     */
+    struct gib_homing *(*homing_new)(void);
+    /**
+     * See gib_homing_free.
+     */
+    void (*homing_free)(struct gib_homing *handle);
+    /**
+     * See gib_homing_start.
+     */
+    int32_t (*homing_start)(struct gib_homing *handle, const struct gib_homing_config *config);
+    /**
+     * See gib_homing_step.
+     */
+    int32_t (*homing_step)(struct gib_homing *handle,
+                           const struct gib_homing_input *input,
+                           struct gib_homing_output *output);
+    /**
+     * See gib_homing_abort.
+     */
+    int32_t (*homing_abort)(struct gib_homing *handle);
+    /**
+     * See gib_homing_result.
+     */
+    int32_t (*homing_result)(const struct gib_homing *handle, struct gib_homing_report *report);
+    /**
+     * See gib_homing_last_error.
+     */
+    int32_t (*homing_last_error)(const struct gib_homing *handle, struct gib_error_detail *detail);
 } gib_api_table;
 
 #ifdef __cplusplus
@@ -1167,6 +1737,139 @@ int32_t gib_backlash_compare(struct gib_backlash *handle,
  * `handle` is NULL or an instance; `detail` is NULL or writable.
  */
 int32_t gib_backlash_last_error(const struct gib_backlash *handle, struct gib_error_detail *detail);
+
+/**
+ * Bytes that an instance needs in memory of your own, to be aligned to 16.
+ *
+ * @return the size in bytes, about 66 KiB.
+ *
+ * [thread: any] [real-time: yes] [state: any]
+ */
+uintptr_t gib_homing_size(void);
+
+/**
+ * Makes an idle instance in memory of your own. There is nothing to free; zero or reuse the memory when done.
+ *
+ * @param memory at least `gib_homing_size()` bytes, aligned to 16; stays yours.
+ * @param size bytes at `memory`.
+ * @param out receives the handle; NULL on error.
+ * @return GIB_OK; GIB_ERR_NULL; GIB_ERR_MEMORY when too small or misaligned.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ *
+ * # Safety
+ * `memory` is NULL or points to `size` writable bytes; `out` is NULL or writable.
+ */
+int32_t gib_homing_init_in(void *memory, uintptr_t size, struct gib_homing **out);
+
+/**
+ * Makes an idle instance in memory that gib allocates.
+ *
+ * @return the handle, to be given to `gib_homing_free`; NULL when there is no memory.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ */
+struct gib_homing *gib_homing_new(void);
+
+/**
+ * Frees an instance made by `gib_homing_new`. NULL is allowed and does nothing.
+ *
+ * Abort a running homing and step it to its end first: memory that is gone can restore nothing.
+ *
+ * @param handle an instance from `gib_homing_new`, never one from `gib_homing_init_in`.
+ *
+ * [thread: setup] [real-time: no] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or came from `gib_homing_new` and was not freed before.
+ */
+void gib_homing_free(struct gib_homing *handle);
+
+/**
+ * Checks the configuration and arms a homing, which begins with the next step.
+ *
+ * The rising edge of PLCopen's Execute. Clears the previous result and error. The old torque limit is read from
+ * `torque_limit` of the first step's input.
+ *
+ * @param handle the instance.
+ * @param config how to home; copied. Set `struct_size`, zero the rest, then set what you want.
+ * @return GIB_OK; GIB_ERR_CONFIG (gib_homing_last_error names the field and its range), GIB_ERR_STRUCT_SIZE,
+ * GIB_ERR_STATE while busy, GIB_ERR_RESTORE_UNCONFIRMED while the old torque limit is still owed,
+ * GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup, or cycle between steps] [real-time: yes] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `config` is NULL or points to its `struct_size` readable bytes.
+ */
+int32_t gib_homing_start(struct gib_homing *handle,
+                         const struct gib_homing_config *config);
+
+/**
+ * One servo cycle. Call it in every cycle, also when idle: requests are made and restored through it.
+ *
+ * While `owns_motion` is 1, follow `target_position_mm` and report each motor's position and torque of the same
+ * instant. When `request_id` changes, carry out `requests`, then report the number in `acknowledged_id`, and in
+ * `torque_limit` the limit in force. Take the torque off the motors while `stop_drive` is 1.
+ *
+ * @param handle the instance.
+ * @param input measured values of this cycle.
+ * @param output commands for this cycle; always written when not NULL.
+ * @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
+ * GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_ACK_TIMEOUT, GIB_ERR_TORQUE_BOUND,
+ * GIB_ERR_TRAVEL_BOUND, GIB_ERR_DEADLINE, GIB_ERR_LAG, GIB_ERR_HOMING_...;
+ * and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `input` is NULL or readable; `output` is NULL or writable.
+ */
+int32_t gib_homing_step(struct gib_homing *handle,
+                        const struct gib_homing_input *input,
+                        struct gib_homing_output *output);
+
+/**
+ * Aborts a running homing: the next steps brake, take the pressure off the stop, restore the old torque limit, and
+ * end with GIB_ERR_ABORTED. Does nothing when not busy. To abort from another thread set `GIB_INPUT_ABORT` in the input.
+ *
+ * @param handle the instance.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance.
+ */
+int32_t gib_homing_abort(struct gib_homing *handle);
+
+/**
+ * Reads what was found: complete after GIB_DONE, else what is known so far.
+ *
+ * @param handle the instance.
+ * @param report receives it.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `report` is NULL or writable.
+ */
+int32_t gib_homing_result(const struct gib_homing *handle, struct gib_homing_report *report);
+
+/**
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ *
+ * @param handle the instance.
+ * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `detail` is NULL or writable.
+ */
+int32_t gib_homing_last_error(const struct gib_homing *handle, struct gib_error_detail *detail);
 
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
