@@ -23,7 +23,8 @@ pub(super) fn read(source: impl Read, file: &str, length: u64) -> Result<(Vec<f6
             "is empty; expected a header line such as time_s,x.position_mm,x.torque_nm",
         ));
     }
-    let names = header(&record, file)?;
+    let names = record.iter().map(|cell| String::from_utf8_lossy(cell).trim().to_owned()).collect();
+    let names = header(names, file)?;
 
     let mut values: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
     let mut row = 0;
@@ -56,8 +57,8 @@ fn skip_byte_order_mark(source: &mut impl BufRead, file: &str) -> Result<(), Rec
     Ok(())
 }
 
-fn header(record: &::csv::ByteRecord, file: &str) -> Result<Vec<String>, RecordingError> {
-    let names: Vec<String> = record.iter().map(|cell| String::from_utf8_lossy(cell).trim().to_owned()).collect();
+/// Checks that the time comes first.
+pub(super) fn header(names: Vec<String>, file: &str) -> Result<Vec<String>, RecordingError> {
     let first = names.first().map_or("", String::as_str);
     let wrong = |message: String| Err(RecordingError::new(file, message).at_row(1));
     if first == "time_s" {

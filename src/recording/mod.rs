@@ -1,4 +1,4 @@
-//! Recordings of a machine: one time column, then one column a signal, as CSV.
+//! Recordings of a machine: one time column, then one column a signal, as CSV (or Parquet with the feature `parquet`).
 //!
 //! [`Recording::open`] reads the file once and checks it: what cannot be repaired is a [`RecordingError`] with file, row and
 //! column; what can be worked around (gaps, repeats, NaN, counter wraps, irregular sampling) is listed in
@@ -11,6 +11,8 @@ mod check;
 mod csv;
 mod error;
 mod label;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod sampling;
 
 use std::borrow::Cow;
@@ -81,15 +83,32 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Reads the CSV file at `path`.
+    /// Reads the file at `path`: Parquet by its extension, CSV otherwise.
     ///
     /// # Errors
     /// When the file cannot be read, or does not follow the format; the message names row and column.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let name = path.display().to_string();
+        if path.extension().is_some_and(|ext| ext.eq_ignore_ascii_case("parquet")) {
+            return Self::open_parquet(path, &name);
+        }
         let file = File::open(path).map_err(|why| RecordingError::new(&name, format!("cannot be opened: {why}")))?;
         let length = file.metadata().map_or(0, |meta| meta.len());
         Self::read_csv(file, &name, length)
+    }
+
+    #[cfg(feature = "parquet")]
+    fn open_parquet(path: &Path, name: &str) -> Result<Self, RecordingError> {
+        let (time_s, columns) = parquet::read(path, name)?;
+        Self::from_columns(name, time_s, columns)
+    }
+
+    #[cfg(not(feature = "parquet"))]
+    fn open_parquet(_: &Path, name: &str) -> Result<Self, RecordingError> {
+        Err(RecordingError::new(
+            name,
+            "this gib was built without Parquet; build it with `--features parquet`, or give the recording as CSV",
+        ))
     }
 
     /// Reads CSV from anything; `name` stands in messages, `length` is the expected number of bytes (0 when unknown).
