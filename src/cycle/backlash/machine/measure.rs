@@ -346,7 +346,7 @@ impl Backlash {
             Ok(fitted) => fitted,
             Err(fault) => return self.leave(fault),
         };
-        let steps = self.curves[index].used() as f64 * self.plan.bin / self.plan.step;
+        let steps = self.curves[index & 1].used() as f64 * self.plan.bin / self.plan.step;
         self.senses[index & 1].add(&fitted, &self.levels, self.peak.found(), steps);
         self.reversal += 1;
         let all = self.plan.senses * self.plan.repeats;
