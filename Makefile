@@ -12,7 +12,9 @@ INSTALL ?= install
 
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 TARGET := $(or $(CARGO_TARGET_DIR),target)
-RELEASE := $(TARGET)/release
+# PROFILE=quick builds sooner and runs slower: for work on the C programs, never for counts or an install.
+PROFILE ?= release
+RELEASE := $(TARGET)/$(PROFILE)
 # What a C program outside the tree would find installed: the libraries with their links.
 LIB := build/lib
 
@@ -24,7 +26,7 @@ build: $(LIB)/libgib.a ## the libraries (build/lib) and the command (target/rele
 
 # Remade when a source changed, so that `sudo make install` after `make` needs no cargo.
 $(LIB)/libgib.a: Cargo.toml Cargo.lock build.rs tools/static-archive $(shell find src -name '*.rs')
-	$(CARGO) build --release
+	$(CARGO) build --profile $(PROFILE)
 	@mkdir -p $(LIB)
 	@objcopy --strip-debug $(RELEASE)/libgib.so $(LIB)/libgib.so.$(VERSION)
 	@ln -sf libgib.so.$(VERSION) $(LIB)/libgib.so.0
