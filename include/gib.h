@@ -324,6 +324,46 @@
 #define GIB_ERR_HOMING_SQUARE (-212)
 
 /**
+ * The motion does not determine the inertia; the report says which ramp would.
+ */
+#define GIB_ERR_INERTIA_EXCITATION (-300)
+
+/**
+ * Too little of the motion can be used: standing still, take-up, weakened field or saturation all along.
+ */
+#define GIB_ERR_INERTIA_FEW (-301)
+
+/**
+ * The torque falls where the spindle speeds up: its sign does not agree with the speed's.
+ */
+#define GIB_ERR_INERTIA_SIGN (-302)
+
+/**
+ * The inertia found is not above the machine's own: nothing is left for the workpiece.
+ */
+#define GIB_ERR_INERTIA_OWN (-303)
+
+/**
+ * The variation asked for needs more power than the motor has; `_last_error` says what is possible.
+ */
+#define GIB_ERR_SPEED_VARIATION_POWER (-400)
+
+/**
+ * The variation asked for needs more torque than the motor has; `_last_error` says what is possible.
+ */
+#define GIB_ERR_SPEED_VARIATION_TORQUE (-401)
+
+/**
+ * The variation asked for leaves the speeds allowed; `_last_error` says what is possible.
+ */
+#define GIB_ERR_SPEED_VARIATION_SPEED (-402)
+
+/**
+ * Friction and cutting leave the motor nothing to vary the speed with.
+ */
+#define GIB_ERR_SPEED_VARIATION_NONE (-403)
+
+/**
  * Slow-feed mode (default): the motor is fed slowly and the torque read in every cycle. The more accurate one.
  */
 #define GIB_BACKLASH_SLOW_FEED 0
@@ -584,6 +624,127 @@
 #define GIB_HOMING_REQUEST_SET_POSITION 4
 
 /**
+ * gib commands the spindle speed: up, hold, down, hold, `ramps` times (default).
+ */
+#define GIB_INERTIA_RAMP 0
+
+/**
+ * The kernel turns the spindle as it likes; gib listens for `listen_s`, or until `GIB_INERTIA_FINISH`.
+ */
+#define GIB_INERTIA_LISTEN 1
+
+/**
+ * Torque inputs in amperes, times `torque_constant_nm_a`.
+ */
+#define GIB_TORQUE_AMPERE 2
+
+/**
+ * Nothing is going on; the command follows the speed.
+ */
+#define GIB_INERTIA_IDLE 0
+
+/**
+ * Goes to the speed at which the ramps begin.
+ */
+#define GIB_INERTIA_APPROACH 1
+
+/**
+ * Accelerates.
+ */
+#define GIB_INERTIA_UP 2
+
+/**
+ * Holds the upper speed.
+ */
+#define GIB_INERTIA_HOLD_HIGH 3
+
+/**
+ * Brakes.
+ */
+#define GIB_INERTIA_DOWN 4
+
+/**
+ * Holds the lower speed.
+ */
+#define GIB_INERTIA_HOLD_LOW 5
+
+/**
+ * Listens while the kernel turns the spindle.
+ */
+#define GIB_INERTIA_LISTENING 6
+
+/**
+ * Goes back to the speed at which it was started.
+ */
+#define GIB_INERTIA_RETURN 7
+
+/**
+ * Ended; the result can be read.
+ */
+#define GIB_INERTIA_DONE 8
+
+/**
+ * Ended with an error; kept until the next start.
+ */
+#define GIB_INERTIA_FAILED 9
+
+/**
+ * Input flag: listening has lasted long enough; evaluate what was gathered.
+ */
+#define GIB_INERTIA_FINISH 4
+
+/**
+ * The speed rises and falls at a constant rate (default).
+ */
+#define GIB_SPEED_VARIATION_TRIANGLE 0
+
+/**
+ * The speed swings as a sine.
+ */
+#define GIB_SPEED_VARIATION_SINE 1
+
+/**
+ * Limits keep torque and power within the motor's at every moment (default).
+ */
+#define GIB_SPEED_VARIATION_EXACT 0
+
+/**
+ * Limits as published: the power at the mean speed only, nothing for friction and cutting. The motor is asked for up
+ * to (1 + amplitude) times its power. For comparison.
+ */
+#define GIB_SPEED_VARIATION_PUBLISHED 1
+
+/**
+ * Nothing is varied; the command is the speed asked for.
+ */
+#define GIB_SPEED_VARIATION_IDLE 0
+
+/**
+ * The speed varies.
+ */
+#define GIB_SPEED_VARIATION_RUNNING 1
+
+/**
+ * The speed goes back to its mean.
+ */
+#define GIB_SPEED_VARIATION_STOPPING 2
+
+/**
+ * Ended as asked for, at the mean speed.
+ */
+#define GIB_SPEED_VARIATION_DONE 3
+
+/**
+ * Ended with an error; kept until the next start.
+ */
+#define GIB_SPEED_VARIATION_FAILED 4
+
+/**
+ * Input flag: end the variation; the speed goes back to its mean, then `GIB_DONE`.
+ */
+#define GIB_SPEED_VARIATION_STOP 8
+
+/**
  * Version of this interface: major · 65536 + minor.
  *
  * Within one major, functions, struct tails and status numbers are added and nothing is changed or taken away;
@@ -627,9 +788,19 @@ typedef struct gib_backlash gib_backlash;
 typedef struct gib_homing gib_homing;
 
 /**
+ * An inertia measurement of one spindle. Opaque; its size is `gib_inertia_size()`.
+ */
+typedef struct gib_inertia gib_inertia;
+
+/**
  * Reads and writes part programs, and keeps why the last call failed. Opaque; its size is `gib_program_size()`.
  */
 typedef struct gib_program gib_program;
+
+/**
+ * A speed variation of one spindle. Opaque; its size is `gib_speed_variation_size()`.
+ */
+typedef struct gib_speed_variation gib_speed_variation;
 
 /**
  * What to measure and within which bounds. Zero in a field means its default; fields marked "required" have none.
@@ -1330,6 +1501,483 @@ typedef struct gib_homing_report {
 } gib_homing_report;
 
 /**
+ * What to measure and within which bounds. Zero in a field means its default; fields marked "required" have none.
+ *
+ * Torque fields are in N·m whatever `torque_unit` says; all are at the spindle.
+ */
+typedef struct gib_inertia_config {
+    /**
+     * Size of this struct as the caller knows it: `sizeof(gib_inertia_config)`. Required.
+     */
+    uint32_t struct_size;
+    /**
+     * `GIB_INERTIA_RAMP` (default) or `GIB_INERTIA_LISTEN`.
+     */
+    int32_t mode;
+    /**
+     * Unit of the torque input: `GIB_TORQUE_NM` (default), `GIB_TORQUE_PERMILLE` of `rated_torque_nm`, or
+     * `GIB_TORQUE_AMPERE` times `torque_constant_nm_a`.
+     */
+    int32_t torque_unit;
+    /**
+     * Times up and down, 1 to 50 (default 2).
+     */
+    int32_t ramps;
+    /**
+     * Process step that the value will belong to, 0 for the whole program, to 9999. Given back in the report.
+     */
+    int32_t process_step;
+    /**
+     * Must be 0.
+     */
+    int32_t reserved;
+    /**
+     * Servo period, 0.00005 to 0.02 s. Required.
+     */
+    double cycle_s;
+    /**
+     * Speed at which the ramps begin, rpm, at or above 0 (default a tenth of `speed_high_rpm`).
+     */
+    double speed_low_rpm;
+    /**
+     * Speed at which the ramps end, rpm, up to 200000. Required for ramps. Negative: turns the other way.
+     */
+    double speed_high_rpm;
+    /**
+     * Acceleration of the ramps, rpm/s. Required for ramps.
+     */
+    double acceleration_rpm_s;
+    /**
+     * Time at constant speed after each ramp, up to 60 s (default 0.3).
+     */
+    double hold_s;
+    /**
+     * Time after each change of acceleration or sense that is left out: take-up of belts and gears, and the
+     * drive's own transients, up to 5 s (default 0.1).
+     */
+    double takeup_s;
+    /**
+     * Time to listen, up to 3600 s. Required for `GIB_INERTIA_LISTEN`.
+     */
+    double listen_s;
+    /**
+     * Speed below which the spindle counts as standing, rpm, up to 1000 (default 1).
+     */
+    double standstill_rpm;
+    /**
+     * Speed above which the field is weakened, so that current × constant is not the torque; what is faster is left
+     * out, rpm (default: none known).
+     */
+    double base_speed_rpm;
+    /**
+     * Torque above which the motor saturates, so that it delivers less than reported; what is above is left out,
+     * N·m (default: none known).
+     */
+    double saturation_nm;
+    /**
+     * Largest |torque| allowed, N·m (default: not watched).
+     */
+    double torque_bound_nm;
+    /**
+     * Largest |command - speed| allowed, rpm (default: a quarter of `speed_high_rpm`).
+     */
+    double lag_limit_rpm;
+    /**
+     * Rated torque, N·m. Required for `GIB_TORQUE_PERMILLE`.
+     */
+    double rated_torque_nm;
+    /**
+     * Torque constant, N·m/A. Required for `GIB_TORQUE_AMPERE`.
+     */
+    double torque_constant_nm_a;
+    /**
+     * The machine's own inertia (spindle, rotor, chuck), kg·m²; taken off, so that the value belongs to the workpiece
+     * and travels to another machine (default 0: nothing is taken off).
+     */
+    double own_inertia_kg_m2;
+    /**
+     * Its expanded uncertainty (k = 2), kg·m².
+     */
+    double own_uncertainty_kg_m2;
+    /**
+     * Expanded uncertainty wanted, as a share of the total inertia, 0.001 to 0.25 (default 0.05). The report says
+     * which ramp would reach it.
+     */
+    double target_ratio;
+} gib_inertia_config;
+/**
+ * Size of the struct in the first published ABI.
+ */
+#define gib_inertia_config_FIRST_SIZE 160
+
+/**
+ * What the kernel tells gib in a cycle.
+ */
+typedef struct gib_inertia_input {
+    /**
+     * Spindle speed, rpm, signed.
+     */
+    double speed_rpm;
+    /**
+     * Motor torque of the same instant, positive toward positive speed, in the unit that the configuration names.
+     */
+    double torque;
+    /**
+     * `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`, `GIB_INERTIA_FINISH`; other bits must be 0.
+     */
+    uint32_t flags;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+} gib_inertia_input;
+
+/**
+ * What gib asks of the kernel in a cycle. Always written, and safe, also when the call returns an error.
+ */
+typedef struct gib_inertia_output {
+    /**
+     * Commanded spindle speed, rpm. To be followed while `owns_motion` is 1.
+     */
+    double speed_command_rpm;
+    /**
+     * Share of the measurement done, 0 to 1.
+     */
+    double progress_ratio;
+    /**
+     * What the step returned: `GIB_OK`, `GIB_BUSY`, `GIB_DONE` or the first error.
+     */
+    int32_t status;
+    /**
+     * One of the `GIB_INERTIA_…` phases.
+     */
+    int32_t phase;
+    /**
+     * Message number: 0, or the error to tell the operator about; its text is `gib_status_text`.
+     */
+    int32_t message;
+    /**
+     * 1 while gib commands the spindle, else 0.
+     */
+    int32_t owns_motion;
+} gib_inertia_output;
+
+/**
+ * Inertia and friction of a spindle. Uncertainties are expanded: the interval holds the truth in 95 of 100 cases.
+ */
+typedef struct gib_inertia_report {
+    /**
+     * All that turns, kg·m².
+     */
+    double total_kg_m2;
+    /**
+     * Its expanded uncertainty, kg·m².
+     */
+    double total_uncertainty_kg_m2;
+    /**
+     * Total minus the machine's own: the workpiece's, what `INA` holds. Equal to the total where no own one is given.
+     */
+    double workpiece_kg_m2;
+    /**
+     * Its expanded uncertainty, kg·m².
+     */
+    double workpiece_uncertainty_kg_m2;
+    /**
+     * Coulomb friction, N·m. Holds a constant torque too where the spindle turned one way only.
+     */
+    double coulomb_nm;
+    /**
+     * Its expanded uncertainty, N·m.
+     */
+    double coulomb_uncertainty_nm;
+    /**
+     * Viscous friction, N·m·s/rad.
+     */
+    double viscous_nm_s;
+    /**
+     * Its expanded uncertainty, N·m·s/rad.
+     */
+    double viscous_uncertainty_nm_s;
+    /**
+     * Constant torque, N·m; 0 where the spindle turned one way only.
+     */
+    double constant_nm;
+    /**
+     * What torque over acceleration alone would say, kg·m²: friction counted as inertia.
+     */
+    double naive_kg_m2;
+    /**
+     * Standard deviation of a block's torque about the fit, N·m.
+     */
+    double scatter_nm;
+    /**
+     * Speed above which torque and motion no longer agree (field weakening), rpm; 0: none found.
+     */
+    double weakening_rpm;
+    /**
+     * Torque above which torque and motion no longer agree (saturation), N·m; 0: none found.
+     */
+    double saturation_nm;
+    /**
+     * The ramp that would reach the uncertainty wanted: its lower speed, rpm.
+     */
+    double ramp_low_rpm;
+    /**
+     * Its upper speed, rpm.
+     */
+    double ramp_high_rpm;
+    /**
+     * Its acceleration, rpm/s.
+     */
+    double ramp_acceleration_rpm_s;
+    /**
+     * Torque that it takes at its upper speed, N·m; 0: not known.
+     */
+    double ramp_torque_nm;
+    /**
+     * How often it goes up and down.
+     */
+    int32_t ramp_times;
+    /**
+     * `GIB_OK`, or why the inertia cannot be used: `GIB_ERR_INERTIA_…`.
+     */
+    int32_t verdict;
+    /**
+     * 1 when the uncertainty wanted was reached.
+     */
+    int32_t target_reached;
+    /**
+     * 1 when the spindle both sped up and slowed down: only then is inertia independent of friction.
+     */
+    int32_t both_ways;
+    /**
+     * Blocks that the result rests on.
+     */
+    int32_t blocks_used;
+    /**
+     * Blocks dropped as outliers.
+     */
+    int32_t blocks_dropped;
+    /**
+     * Blocks left out as weakened or saturated.
+     */
+    int32_t blocks_left_out;
+    /**
+     * Process step that the value belongs to, as configured.
+     */
+    int32_t process_step;
+} gib_inertia_report;
+
+/**
+ * What to vary, by which motor. Zero in a field means its default; fields marked "required" have none.
+ */
+typedef struct gib_speed_variation_config {
+    /**
+     * Size of this struct as the caller knows it: `sizeof(gib_speed_variation_config)`. Required.
+     */
+    uint32_t struct_size;
+    /**
+     * `GIB_SPEED_VARIATION_TRIANGLE` (default) or `GIB_SPEED_VARIATION_SINE`.
+     */
+    int32_t waveform;
+    /**
+     * `GIB_SPEED_VARIATION_EXACT` (default) or `GIB_SPEED_VARIATION_PUBLISHED`.
+     */
+    int32_t formula;
+    /**
+     * Must be 0.
+     */
+    int32_t reserved;
+    /**
+     * Servo period, 0.00005 to 0.02 s. Required to start.
+     */
+    double cycle_s;
+    /**
+     * Mean spindle speed, rpm; negative turns the other way. Required.
+     */
+    double speed_rpm;
+    /**
+     * Amplitude as a share of the mean speed, above 0 and below 1 (0.1 is ±10 %). Required to start.
+     */
+    double amplitude_ratio;
+    /**
+     * Period of the variation, 0.02 to 600 s. Required to start.
+     */
+    double period_s;
+    /**
+     * Inertia of workpiece and chuck, kg·m²: measured, or `INA` from the program's head. Required.
+     */
+    double inertia_kg_m2;
+    /**
+     * The machine's own inertia (spindle, rotor), kg·m², added to it.
+     */
+    double own_inertia_kg_m2;
+    /**
+     * Largest power of the motor, W. Required.
+     */
+    double power_w;
+    /**
+     * Largest torque of the motor at the spindle, N·m (default: only the power limits).
+     */
+    double torque_nm;
+    /**
+     * Highest speed allowed, rpm (default 200000).
+     */
+    double speed_max_rpm;
+    /**
+     * Lowest speed allowed, rpm (default 0).
+     */
+    double speed_min_rpm;
+    /**
+     * Coulomb friction of the spindle, N·m.
+     */
+    double coulomb_nm;
+    /**
+     * Viscous friction of the spindle, N·m·s/rad.
+     */
+    double viscous_nm_s;
+    /**
+     * Torque that cutting uses, N·m.
+     */
+    double cutting_nm;
+    /**
+     * Share of torque and power to keep back, 0 to 0.9.
+     */
+    double reserve_ratio;
+    /**
+     * Frequency of the chatter to be broken up, Hz; for the recommended values only (default: not known).
+     */
+    double chatter_hz;
+} gib_speed_variation_config;
+/**
+ * Size of the struct in the first published ABI.
+ */
+#define gib_speed_variation_config_FIRST_SIZE 136
+
+/**
+ * What the kernel asks for in a cycle. Values may change at any time.
+ */
+typedef struct gib_speed_variation_input {
+    /**
+     * Mean spindle speed, rpm, with override; in the sense of the configuration.
+     */
+    double speed_rpm;
+    /**
+     * Amplitude as a share of the mean speed; 0: as configured.
+     */
+    double amplitude_ratio;
+    /**
+     * Period, s; 0: as configured.
+     */
+    double period_s;
+    /**
+     * Torque that cutting uses now, N·m; the configuration's holds where that is more.
+     */
+    double cutting_nm;
+    /**
+     * `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`, `GIB_SPEED_VARIATION_STOP`; other bits must be 0.
+     */
+    uint32_t flags;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+} gib_speed_variation_input;
+
+/**
+ * What gib asks of the kernel in a cycle. Always written, and safe, also when the call returns an error.
+ */
+typedef struct gib_speed_variation_output {
+    /**
+     * Commanded spindle speed, rpm.
+     */
+    double speed_command_rpm;
+    /**
+     * Torque that the commanded change of speed takes, J·ω', N·m: feed-forward for the drive.
+     */
+    double torque_nm;
+    /**
+     * Amplitude in effect: the one asked for, or the largest possible one where that is less.
+     */
+    double amplitude_ratio;
+    /**
+     * Largest amplitude possible at the period and speed asked for.
+     */
+    double amplitude_limit_ratio;
+    /**
+     * Shortest period possible at the amplitude and speed asked for, s; 0: none.
+     */
+    double period_limit_s;
+    /**
+     * What the step returned: `GIB_OK`, `GIB_BUSY`, `GIB_DONE` or the first error.
+     */
+    int32_t status;
+    /**
+     * One of the `GIB_SPEED_VARIATION_…` phases.
+     */
+    int32_t phase;
+    /**
+     * Message number: 0, the error, or why the amplitude in effect is less than asked for.
+     */
+    int32_t message;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
+} gib_speed_variation_output;
+
+/**
+ * What is possible, and what is recommended.
+ */
+typedef struct gib_speed_variation_limits {
+    /**
+     * Largest amplitude for the period given; 0: none, or no period was given.
+     */
+    double amplitude_ratio;
+    /**
+     * Shortest period for the amplitude given, s; 0: none does, or no amplitude was given.
+     */
+    double period_s;
+    /**
+     * Largest amplitude for the period, as published.
+     */
+    double published_amplitude_ratio;
+    /**
+     * Shortest period for the amplitude, as published, s.
+     */
+    double published_period_s;
+    /**
+     * Power that the published amplitude would take at the top of its swing, friction and cutting included, W.
+     */
+    double published_power_w;
+    /**
+     * Recommended amplitude: sweeps the chatter's regeneration through one wave, or 10 % where the chatter's
+     * frequency is not given.
+     */
+    double recommended_amplitude_ratio;
+    /**
+     * Recommended period: the shortest for it that the motor can do, s; 0: none.
+     */
+    double recommended_period_s;
+    /**
+     * Power at the top of the swing of the amplitude and period given, W; 0: not both were given.
+     */
+    double power_w;
+    /**
+     * Torque at the top of that swing, N·m.
+     */
+    double torque_nm;
+    /**
+     * What limits the amplitude: `GIB_ERR_SPEED_VARIATION_POWER`, `_TORQUE`, `_SPEED` or `_NONE`; 0 without a period.
+     */
+    int32_t limited_by;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
+} gib_speed_variation_limits;
+
+/**
  * All functions of the library, each named as in this header without its `gib_`.
  *
  * Get it from `gib_api`. A member whose offset is not below `struct_size` is not in this library.
@@ -1495,6 +2143,90 @@ typedef struct gib_api_table {
      * See gib_homing_last_error.
      */
     int32_t (*homing_last_error)(const struct gib_homing *handle, struct gib_error_detail *detail);
+    /**
+     * See gib_inertia_size.
+     */
+    uintptr_t (*inertia_size)(void);
+    /**
+     * See gib_inertia_init_in.
+     */
+    int32_t (*inertia_init_in)(void *memory, uintptr_t size, struct gib_inertia **out);
+    /**
+     * See gib_inertia_new.
+     */
+    struct gib_inertia *(*inertia_new)(void);
+    /**
+     * See gib_inertia_free.
+     */
+    void (*inertia_free)(struct gib_inertia *handle);
+    /**
+     * See gib_inertia_start.
+     */
+    int32_t (*inertia_start)(struct gib_inertia *handle, const struct gib_inertia_config *config);
+    /**
+     * See gib_inertia_step.
+     */
+    int32_t (*inertia_step)(struct gib_inertia *handle,
+                            const struct gib_inertia_input *input,
+                            struct gib_inertia_output *output);
+    /**
+     * See gib_inertia_abort.
+     */
+    int32_t (*inertia_abort)(struct gib_inertia *handle);
+    /**
+     * See gib_inertia_result.
+     */
+    int32_t (*inertia_result)(struct gib_inertia *handle, struct gib_inertia_report *report);
+    /**
+     * See gib_inertia_last_error.
+     */
+    int32_t (*inertia_last_error)(const struct gib_inertia *handle, struct gib_error_detail *detail);
+    /**
+     * See gib_speed_variation_size.
+     */
+    uintptr_t (*speed_variation_size)(void);
+    /**
+     * See gib_speed_variation_init_in.
+     */
+    int32_t (*speed_variation_init_in)(void *memory, uintptr_t size, struct gib_speed_variation **out);
+    /**
+     * See gib_speed_variation_new.
+     */
+    struct gib_speed_variation *(*speed_variation_new)(void);
+    /**
+     * See gib_speed_variation_free.
+     */
+    void (*speed_variation_free)(struct gib_speed_variation *handle);
+    /**
+     * See gib_speed_variation_start.
+     */
+    int32_t (*speed_variation_start)(struct gib_speed_variation *handle,
+                                     const struct gib_speed_variation_config *config);
+    /**
+     * See gib_speed_variation_step.
+     */
+    int32_t (*speed_variation_step)(struct gib_speed_variation *handle,
+                                    const struct gib_speed_variation_input *input,
+                                    struct gib_speed_variation_output *output);
+    /**
+     * See gib_speed_variation_abort.
+     */
+    int32_t (*speed_variation_abort)(struct gib_speed_variation *handle);
+    /**
+     * See gib_speed_variation_result.
+     */
+    int32_t (*speed_variation_result)(struct gib_speed_variation *handle,
+                                      struct gib_speed_variation_limits *limits);
+    /**
+     * See gib_speed_variation_possible.
+     */
+    int32_t (*speed_variation_possible)(const struct gib_speed_variation_config *config,
+                                        struct gib_speed_variation_limits *limits);
+    /**
+     * See gib_speed_variation_last_error.
+     */
+    int32_t (*speed_variation_last_error)(const struct gib_speed_variation *handle,
+                                          struct gib_error_detail *detail);
 } gib_api_table;
 
 #ifdef __cplusplus
@@ -1874,6 +2606,134 @@ int32_t gib_homing_last_error(const struct gib_homing *handle, struct gib_error_
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
  *
+ * @return the size in bytes, about 13 KiB.
+ *
+ * [thread: any] [real-time: yes] [state: any]
+ */
+uintptr_t gib_inertia_size(void);
+
+/**
+ * Makes an idle instance in memory of your own. There is nothing to free; zero or reuse the memory when done.
+ *
+ * @param memory at least `gib_inertia_size()` bytes, aligned to 16; stays yours.
+ * @param size bytes at `memory`.
+ * @param out receives the handle; NULL on error.
+ * @return GIB_OK; GIB_ERR_NULL; GIB_ERR_MEMORY when too small or misaligned.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ *
+ * # Safety
+ * `memory` is NULL or points to `size` writable bytes; `out` is NULL or writable.
+ */
+int32_t gib_inertia_init_in(void *memory, uintptr_t size, struct gib_inertia **out);
+
+/**
+ * Makes an idle instance in memory that gib allocates.
+ *
+ * @return the handle, to be given to `gib_inertia_free`; NULL when there is no memory.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ */
+struct gib_inertia *gib_inertia_new(void);
+
+/**
+ * Frees an instance made by `gib_inertia_new`. NULL is allowed and does nothing.
+ *
+ * @param handle an instance from `gib_inertia_new`, never one from `gib_inertia_init_in`.
+ *
+ * [thread: setup] [real-time: no] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or came from `gib_inertia_new` and was not freed before.
+ */
+void gib_inertia_free(struct gib_inertia *handle);
+
+/**
+ * Checks the configuration and arms a measurement, which begins with the next step.
+ *
+ * The rising edge of PLCopen's Execute. Clears the previous result and error. Where the part program's head already
+ * holds `INA` (`gib_program_get`), measuring is to be skipped, as published.
+ *
+ * @param handle the instance.
+ * @param config what to measure; copied. Set `struct_size`, zero the rest, then set what you want.
+ * @return GIB_OK; GIB_ERR_CONFIG (gib_inertia_last_error names the field and its range), GIB_ERR_STRUCT_SIZE,
+ * GIB_ERR_STATE while busy, GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup, or cycle between steps] [real-time: yes] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `config` is NULL or points to its `struct_size` readable bytes.
+ */
+int32_t gib_inertia_start(struct gib_inertia *handle,
+                          const struct gib_inertia_config *config);
+
+/**
+ * One servo cycle: gathers speed and torque, and commands the ramps while `owns_motion` is 1.
+ *
+ * @param handle the instance.
+ * @param input measured values of this cycle.
+ * @param output command for this cycle; always written when not NULL.
+ * @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
+ * GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_TORQUE_BOUND, GIB_ERR_LAG; and GIB_ERR_NULL,
+ * GIB_ERR_HANDLE of this call.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `input` is NULL or readable; `output` is NULL or writable.
+ */
+int32_t gib_inertia_step(struct gib_inertia *handle,
+                         const struct gib_inertia_input *input,
+                         struct gib_inertia_output *output);
+
+/**
+ * Aborts a running measurement: the next steps go back to the speed at start and end with GIB_ERR_ABORTED. Does
+ * nothing when not busy. To abort from another thread set `GIB_INPUT_ABORT` in the input.
+ *
+ * @param handle the instance.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance.
+ */
+int32_t gib_inertia_abort(struct gib_inertia *handle);
+
+/**
+ * Fits what was gathered, off the cycle: takes some milliseconds.
+ *
+ * The report is written also when the value cannot be used; it then says which ramp would do.
+ *
+ * @param handle the instance, after GIB_DONE.
+ * @param report receives inertia, friction, uncertainties and the ramp that would do better.
+ * @return GIB_OK; GIB_ERR_STATE before GIB_DONE; GIB_ERR_INERTIA_EXCITATION, GIB_ERR_INERTIA_FEW,
+ * GIB_ERR_INERTIA_SIGN, GIB_ERR_INERTIA_OWN when the value cannot be used; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup] [real-time: no] [state: after GIB_DONE]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `report` is NULL or writable.
+ */
+int32_t gib_inertia_result(struct gib_inertia *handle, struct gib_inertia_report *report);
+
+/**
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ *
+ * @param handle the instance.
+ * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `detail` is NULL or writable.
+ */
+int32_t gib_inertia_last_error(const struct gib_inertia *handle, struct gib_error_detail *detail);
+
+/**
+ * Bytes that an instance needs in memory of your own, to be aligned to 16.
+ *
  * @return the size in bytes, below 1 KiB.
  *
  * [thread: any] [real-time: yes] [state: any]
@@ -2019,6 +2879,153 @@ int32_t gib_program_last_error(const struct gib_program *handle,
  * `handle` is NULL or an instance; `text` is NULL or points to `size` writable bytes.
  */
 int32_t gib_program_last_error_text(const struct gib_program *handle, char *text, uintptr_t size);
+
+/**
+ * Bytes that an instance needs in memory of your own, to be aligned to 16.
+ *
+ * @return the size in bytes, below 1 KiB.
+ *
+ * [thread: any] [real-time: yes] [state: any]
+ */
+uintptr_t gib_speed_variation_size(void);
+
+/**
+ * Makes an idle instance in memory of your own. There is nothing to free; zero or reuse the memory when done.
+ *
+ * @param memory at least `gib_speed_variation_size()` bytes, aligned to 16; stays yours.
+ * @param size bytes at `memory`.
+ * @param out receives the handle; NULL on error.
+ * @return GIB_OK; GIB_ERR_NULL; GIB_ERR_MEMORY when too small or misaligned.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ *
+ * # Safety
+ * `memory` is NULL or points to `size` writable bytes; `out` is NULL or writable.
+ */
+int32_t gib_speed_variation_init_in(void *memory, uintptr_t size, struct gib_speed_variation **out);
+
+/**
+ * Makes an idle instance in memory that gib allocates.
+ *
+ * @return the handle, to be given to `gib_speed_variation_free`; NULL when there is no memory.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ */
+struct gib_speed_variation *gib_speed_variation_new(void);
+
+/**
+ * Frees an instance made by `gib_speed_variation_new`. NULL is allowed and does nothing.
+ *
+ * @param handle an instance from `gib_speed_variation_new`, never one from `gib_speed_variation_init_in`.
+ *
+ * [thread: setup] [real-time: no] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or came from `gib_speed_variation_new` and was not freed before.
+ */
+void gib_speed_variation_free(struct gib_speed_variation *handle);
+
+/**
+ * Checks the configuration and arms a variation, which begins with the next step at the mean speed.
+ *
+ * What the motor cannot do is refused: gib_speed_variation_last_error then names `amplitude_ratio` with the largest
+ * possible one as upper bound.
+ *
+ * @param handle the instance.
+ * @param config what to vary, by which motor; copied. Set `struct_size`, zero the rest, then set what you want.
+ * @return GIB_OK; GIB_ERR_SPEED_VARIATION_POWER, _TORQUE, _SPEED, _NONE; GIB_ERR_CONFIG, GIB_ERR_STRUCT_SIZE,
+ * GIB_ERR_STATE while busy, GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup, or cycle between steps] [real-time: yes] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `config` is NULL or points to its `struct_size` readable bytes.
+ */
+int32_t gib_speed_variation_start(struct gib_speed_variation *handle,
+                                  const struct gib_speed_variation_config *config);
+
+/**
+ * One servo cycle: the speed command.
+ *
+ * It begins and ends at the mean speed without a jump. Mean speed, amplitude, period and cutting torque may change in
+ * any cycle; torque, power and speed stay within the motor's. Where more is asked for than it can do, the amplitude
+ * is cut to what it can, and `message` says why. A cycle in which something changes costs more than the others.
+ *
+ * @param handle the instance.
+ * @param input what is asked for in this cycle.
+ * @param output command for this cycle; always written when not NULL.
+ * @return GIB_OK when idle, GIB_BUSY, GIB_DONE after `GIB_SPEED_VARIATION_STOP`, or the first error, which is kept
+ * until the next start: GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_CONFIG,
+ * GIB_ERR_SPEED_VARIATION_SPEED; and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `input` is NULL or readable; `output` is NULL or writable.
+ */
+int32_t gib_speed_variation_step(struct gib_speed_variation *handle,
+                                 const struct gib_speed_variation_input *input,
+                                 struct gib_speed_variation_output *output);
+
+/**
+ * Aborts a running variation: the next steps go back to the mean speed and end with GIB_ERR_ABORTED. Does nothing
+ * when not busy. To end well set `GIB_SPEED_VARIATION_STOP` in the input instead.
+ *
+ * @param handle the instance.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance.
+ */
+int32_t gib_speed_variation_abort(struct gib_speed_variation *handle);
+
+/**
+ * What is possible and recommended for the variation that was started last.
+ *
+ * @param handle the instance.
+ * @param limits receives it.
+ * @return GIB_OK; GIB_ERR_STATE before the first start; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup, or cycle] [real-time: yes] [state: after a start]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `limits` is NULL or writable.
+ */
+int32_t gib_speed_variation_result(struct gib_speed_variation *handle,
+                                   struct gib_speed_variation_limits *limits);
+
+/**
+ * What a motor can do: largest amplitude for a period, shortest period for an amplitude, as published and exact, and
+ * what is recommended. Needs no instance; call it for each point of a chart.
+ *
+ * @param config speed, inertia and motor; `amplitude_ratio` or `period_s` or both; `cycle_s` may stay 0.
+ * @param limits receives it; zeros on error.
+ * @return GIB_OK; GIB_ERR_CONFIG, GIB_ERR_STRUCT_SIZE, GIB_ERR_NULL.
+ *
+ * [thread: any] [real-time: yes] [state: none]
+ *
+ * # Safety
+ * `config` is NULL or points to its `struct_size` readable bytes; `limits` is NULL or writable.
+ */
+int32_t gib_speed_variation_possible(const struct gib_speed_variation_config *config,
+                                     struct gib_speed_variation_limits *limits);
+
+/**
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ *
+ * @param handle the instance.
+ * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `detail` is NULL or writable.
+ */
+int32_t gib_speed_variation_last_error(const struct gib_speed_variation *handle,
+                                       struct gib_error_detail *detail);
 
 /**
  * The table of all functions, so that `dlsym` needs one name: "gib_api".

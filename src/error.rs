@@ -114,6 +114,24 @@ pub const GIB_ERR_HOMING_ENCODER: i32 = -211;
 /// Gantry: the two sides are further apart than the square tolerance.
 pub const GIB_ERR_HOMING_SQUARE: i32 = -212;
 
+/// The motion does not determine the inertia; the report says which ramp would.
+pub const GIB_ERR_INERTIA_EXCITATION: i32 = -300;
+/// Too little of the motion can be used: standing still, take-up, weakened field or saturation all along.
+pub const GIB_ERR_INERTIA_FEW: i32 = -301;
+/// The torque falls where the spindle speeds up: its sign does not agree with the speed's.
+pub const GIB_ERR_INERTIA_SIGN: i32 = -302;
+/// The inertia found is not above the machine's own: nothing is left for the workpiece.
+pub const GIB_ERR_INERTIA_OWN: i32 = -303;
+
+/// The variation asked for needs more power than the motor has; `_last_error` says what is possible.
+pub const GIB_ERR_SPEED_VARIATION_POWER: i32 = -400;
+/// The variation asked for needs more torque than the motor has; `_last_error` says what is possible.
+pub const GIB_ERR_SPEED_VARIATION_TORQUE: i32 = -401;
+/// The variation asked for leaves the speeds allowed; `_last_error` says what is possible.
+pub const GIB_ERR_SPEED_VARIATION_SPEED: i32 = -402;
+/// Friction and cutting leave the motor nothing to vary the speed with.
+pub const GIB_ERR_SPEED_VARIATION_NONE: i32 = -403;
+
 /// Every status and the sentence that explains it.
 const TEXTS: &[(i32, &str)] = &[
     (GIB_OK, "ok\0"),
@@ -169,6 +187,14 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_HOMING_TORQUE_SIGN, "the torque's sign is inverted\0"),
     (GIB_ERR_HOMING_ENCODER, "the encoder stands still or jumps\0"),
     (GIB_ERR_HOMING_SQUARE, "the two sides of the gantry are not square\0"),
+    (GIB_ERR_INERTIA_EXCITATION, "the motion does not determine the inertia\0"),
+    (GIB_ERR_INERTIA_FEW, "too little of the motion can be used for the inertia\0"),
+    (GIB_ERR_INERTIA_SIGN, "torque and speed have opposite signs\0"),
+    (GIB_ERR_INERTIA_OWN, "the inertia found is not above the machine's own\0"),
+    (GIB_ERR_SPEED_VARIATION_POWER, "the speed variation needs more power than the motor has\0"),
+    (GIB_ERR_SPEED_VARIATION_TORQUE, "the speed variation needs more torque than the motor has\0"),
+    (GIB_ERR_SPEED_VARIATION_SPEED, "the speed variation leaves the speeds allowed\0"),
+    (GIB_ERR_SPEED_VARIATION_NONE, "friction and cutting leave the motor nothing to vary the speed with\0"),
 ];
 
 /// The text of a status, NUL-terminated and static; for an unknown number a text that says so.

@@ -6,7 +6,9 @@
 
 use super::backlash::*;
 use super::homing::*;
+use super::inertia::*;
 use super::program::*;
+use super::speed_variation::*;
 use super::types::GibErrorDetail;
 use super::{GIB_ABI_VERSION, gib_abi_version, gib_status_text, gib_version};
 use crate::cycle::backlash::config::BacklashConfig;
@@ -15,6 +17,11 @@ use crate::cycle::backlash::verdict::{BacklashComparison, BacklashReport};
 use crate::cycle::homing::config::HomingConfig;
 use crate::cycle::homing::io::{HomingInput, HomingOutput};
 use crate::cycle::homing::verdict::HomingReport;
+use crate::cycle::inertia::config::InertiaConfig;
+use crate::cycle::inertia::io::{InertiaInput, InertiaOutput};
+use crate::cycle::inertia::report::InertiaReport;
+use crate::cycle::speed_variation::config::{SpeedVariationConfig, SpeedVariationLimits};
+use crate::cycle::speed_variation::io::{SpeedVariationInput, SpeedVariationOutput};
 use core::ffi::{c_char, c_void};
 
 /// All functions of the library, each named as in this header without its `gib_`.
@@ -119,6 +126,55 @@ pub struct GibApiTable {
     pub homing_result: unsafe extern "C" fn(handle: *const GibHoming, report: *mut HomingReport) -> i32,
     /// See gib_homing_last_error.
     pub homing_last_error: unsafe extern "C" fn(handle: *const GibHoming, detail: *mut GibErrorDetail) -> i32,
+    /// See gib_inertia_size.
+    pub inertia_size: extern "C" fn() -> usize,
+    /// See gib_inertia_init_in.
+    pub inertia_init_in: unsafe extern "C" fn(memory: *mut c_void, size: usize, out: *mut *mut GibInertia) -> i32,
+    /// See gib_inertia_new.
+    pub inertia_new: extern "C" fn() -> *mut GibInertia,
+    /// See gib_inertia_free.
+    pub inertia_free: unsafe extern "C" fn(handle: *mut GibInertia),
+    /// See gib_inertia_start.
+    pub inertia_start: unsafe extern "C" fn(handle: *mut GibInertia, config: *const InertiaConfig) -> i32,
+    /// See gib_inertia_step.
+    pub inertia_step:
+        unsafe extern "C" fn(handle: *mut GibInertia, input: *const InertiaInput, output: *mut InertiaOutput) -> i32,
+    /// See gib_inertia_abort.
+    pub inertia_abort: unsafe extern "C" fn(handle: *mut GibInertia) -> i32,
+    /// See gib_inertia_result.
+    pub inertia_result: unsafe extern "C" fn(handle: *mut GibInertia, report: *mut InertiaReport) -> i32,
+    /// See gib_inertia_last_error.
+    pub inertia_last_error: unsafe extern "C" fn(handle: *const GibInertia, detail: *mut GibErrorDetail) -> i32,
+
+    /// See gib_speed_variation_size.
+    pub speed_variation_size: extern "C" fn() -> usize,
+    /// See gib_speed_variation_init_in.
+    pub speed_variation_init_in:
+        unsafe extern "C" fn(memory: *mut c_void, size: usize, out: *mut *mut GibSpeedVariation) -> i32,
+    /// See gib_speed_variation_new.
+    pub speed_variation_new: extern "C" fn() -> *mut GibSpeedVariation,
+    /// See gib_speed_variation_free.
+    pub speed_variation_free: unsafe extern "C" fn(handle: *mut GibSpeedVariation),
+    /// See gib_speed_variation_start.
+    pub speed_variation_start:
+        unsafe extern "C" fn(handle: *mut GibSpeedVariation, config: *const SpeedVariationConfig) -> i32,
+    /// See gib_speed_variation_step.
+    pub speed_variation_step: unsafe extern "C" fn(
+        handle: *mut GibSpeedVariation,
+        input: *const SpeedVariationInput,
+        output: *mut SpeedVariationOutput,
+    ) -> i32,
+    /// See gib_speed_variation_abort.
+    pub speed_variation_abort: unsafe extern "C" fn(handle: *mut GibSpeedVariation) -> i32,
+    /// See gib_speed_variation_result.
+    pub speed_variation_result:
+        unsafe extern "C" fn(handle: *mut GibSpeedVariation, limits: *mut SpeedVariationLimits) -> i32,
+    /// See gib_speed_variation_possible.
+    pub speed_variation_possible:
+        unsafe extern "C" fn(config: *const SpeedVariationConfig, limits: *mut SpeedVariationLimits) -> i32,
+    /// See gib_speed_variation_last_error.
+    pub speed_variation_last_error:
+        unsafe extern "C" fn(handle: *const GibSpeedVariation, detail: *mut GibErrorDetail) -> i32,
 }
 
 static API: GibApiTable = GibApiTable {
@@ -162,6 +218,26 @@ static API: GibApiTable = GibApiTable {
     homing_abort: gib_homing_abort,
     homing_result: gib_homing_result,
     homing_last_error: gib_homing_last_error,
+    inertia_size: gib_inertia_size,
+    inertia_init_in: gib_inertia_init_in,
+    inertia_new: gib_inertia_new,
+    inertia_free: gib_inertia_free,
+    inertia_start: gib_inertia_start,
+    inertia_step: gib_inertia_step,
+    inertia_abort: gib_inertia_abort,
+    inertia_result: gib_inertia_result,
+    inertia_last_error: gib_inertia_last_error,
+
+    speed_variation_size: gib_speed_variation_size,
+    speed_variation_init_in: gib_speed_variation_init_in,
+    speed_variation_new: gib_speed_variation_new,
+    speed_variation_free: gib_speed_variation_free,
+    speed_variation_start: gib_speed_variation_start,
+    speed_variation_step: gib_speed_variation_step,
+    speed_variation_abort: gib_speed_variation_abort,
+    speed_variation_result: gib_speed_variation_result,
+    speed_variation_possible: gib_speed_variation_possible,
+    speed_variation_last_error: gib_speed_variation_last_error,
 };
 
 /// The table of all functions, so that `dlsym` needs one name: "gib_api".

@@ -9,7 +9,9 @@ pub mod api;
 pub mod backlash;
 pub mod guard;
 pub mod homing;
+pub mod inertia;
 pub mod program;
+pub mod speed_variation;
 pub mod types;
 
 use crate::error::status_text;

@@ -4,12 +4,14 @@
 //! error as one sentence.
 
 mod diagnose;
+mod inertia;
 mod inspect;
 mod lost_motion;
 mod machine_file;
 mod predict;
 mod program;
 mod simulate;
+mod speed_variation;
 mod table;
 
 use std::error::Error;
@@ -56,22 +58,26 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Diagnose(diagnose::Diagnose),
+    Inertia(inertia::InertiaCommand),
     Inspect(inspect::Inspect),
     Predict(predict::Predict),
     Program(program::Program),
     LostMotion(lost_motion::LostMotionCommand),
     Simulate(simulate::Simulate),
+    SpeedVariation(speed_variation::SpeedVariationCommand),
 }
 
 /// Runs the command that was asked for.
 pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Diagnose(command) => command.run(),
+        Command::Inertia(command) => command.run(),
         Command::Inspect(command) => command.run(),
         Command::Predict(command) => command.run(),
         Command::Program(command) => command.run(),
         Command::LostMotion(command) => command.run(),
         Command::Simulate(command) => command.run(),
+        Command::SpeedVariation(command) => command.run(),
     };
     match result {
         Ok(answer) => {

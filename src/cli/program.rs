@@ -82,7 +82,7 @@ impl From<Spelling> for Dialect {
     }
 }
 
-fn scope(text: &str) -> std::result::Result<Scope, String> {
+pub(super) fn scope(text: &str) -> std::result::Result<Scope, String> {
     let number = text.parse().ok().and_then(Scope::from_number);
     number.ok_or_else(|| format!("a step is 1 to {}, or 0 for the whole program", Scope::LAST_STEP))
 }

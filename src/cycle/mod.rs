@@ -6,5 +6,7 @@
 
 pub mod backlash;
 pub mod homing;
+pub mod inertia;
 pub mod level;
 pub mod profile;
+pub mod speed_variation;

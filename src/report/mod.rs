@@ -2,3 +2,4 @@
 
 pub mod lost_motion;
 pub mod plot;
+pub mod speed_variation;

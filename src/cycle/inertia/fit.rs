@@ -1,0 +1,353 @@
+//! From blocks to inertia and friction, with uncertainty, or why they cannot be had and which ramp would give them.
+//!
+//! Off the cycle. Beside the robust fit three things are found in the blocks themselves: the noise of the
+//! acceleration, a speed above which torque and motion no longer agree (field weakening: the drive reports current ×
+//! constant, the motor delivers ω_b/ω of it), and a torque above which they no longer agree (saturation).
+
+use super::blocks::{BLOCKS, Block};
+use super::robust::{Regression, Reported, Rows};
+use crate::error::{Fault, GIB_ERR_INERTIA_EXCITATION, GIB_ERR_INERTIA_FEW, GIB_ERR_INERTIA_SIGN};
+
+/// What the fit needs to know beside the blocks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Question {
+    /// Time between samples, s.
+    pub sample_s: f64,
+    /// Expanded uncertainty wanted, as a share of the inertia.
+    pub target: f64,
+    /// The machine's own inertia and its expanded uncertainty, kg·m².
+    pub own: [f64; 2],
+    /// Process step that the value belongs to.
+    pub process_step: i32,
+}
+
+/// A value and its expanded uncertainty (95 %).
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Value {
+    /// The value.
+    pub value: f64,
+    /// Half the width of the interval that holds the truth in 95 of 100 cases.
+    pub uncertainty: f64,
+}
+
+/// A ramp that would reach the uncertainty wanted: up and down again between two speeds.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Ramp {
+    /// Lower and upper speed, rad/s.
+    pub speeds: [f64; 2],
+    /// Acceleration, rad/s².
+    pub acceleration: f64,
+    /// Times up and down.
+    pub times: f64,
+    /// Torque it takes at the upper speed, N·m.
+    pub torque: f64,
+}
+
+/// The balance that the blocks obey.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Balance {
+    /// J, kg·m².
+    pub inertia: Value,
+    /// Tc, N·m.
+    pub coulomb: Value,
+    /// B, N·m·s/rad.
+    pub viscous: Value,
+    /// T0, N·m; zero where the spindle turned one way only, since then it is part of Tc.
+    pub constant: Value,
+    /// What T/ω' alone would say, kg·m²: mean |torque| over mean |acceleration| while accelerating.
+    pub naive: f64,
+    /// Standard deviation of a block's torque about the fit, N·m.
+    pub scatter: f64,
+    /// Blocks that the result rests on, dropped as outliers, and left out as weakened or saturated.
+    pub used: usize,
+    /// Dropped as outliers.
+    pub dropped: usize,
+    /// Left out as weakened or saturated.
+    pub left_out: usize,
+    /// Speed above which torque and motion disagree, rad/s; 0: none found.
+    pub weakening: f64,
+    /// Torque above which torque and motion disagree, N·m; 0: none found.
+    pub saturation: f64,
+    /// True where there is acceleration as well as braking.
+    pub both_ways: bool,
+    /// The ramp that would reach the uncertainty wanted.
+    pub ramp: Ramp,
+}
+
+/// Blocks without which no scatter can be judged.
+const FEWEST: usize = 12;
+/// Expanded uncertainty, as a share of the inertia, beyond which it cannot be called measured: a third.
+const WORST: f64 = 0.33;
+/// How far the evidence for weakening or saturation must stand above chance: the fall of the summed squares over the
+/// variance is χ² with one degree of freedom, and some hundred thresholds are tried; 30 leaves less than one false alarm in
+/// a hundred thousand.
+const EVIDENCE: f64 = 30.0;
+/// Thresholds tried, in equal ratios: a threshold that is 1 % off spoils the fit by 1 % of the torque, hardly more than
+/// the noise of a block.
+const STEPS: usize = 64;
+/// The lowest of them, as a share of the largest value seen.
+const LOWEST: f64 = 0.35;
+/// Share of a block's variance that the parabola's weights add to that of a plain mean (6/5).
+const PARABOLA: f64 = 1.2;
+
+/// Fits the balance. The balance comes back also when it cannot be used, with as much as is known.
+///
+/// # Errors
+/// In the second place: `GIB_ERR_INERTIA_FEW`, `GIB_ERR_INERTIA_EXCITATION`, `GIB_ERR_INERTIA_SIGN`.
+#[must_use]
+pub fn fit(blocks: &[Block], length: u32, question: &Question) -> (Balance, Result<(), Fault>) {
+    let mut balance = Balance { both_ways: both_ways(blocks), naive: naive(blocks), ..Balance::default() };
+    if blocks.len() < FEWEST {
+        let (value, low) = (blocks.len() as f64, FEWEST as f64);
+        let fault = Fault { code: GIB_ERR_INERTIA_FEW, field: "blocks\0", value, low, high: BLOCKS as f64 };
+        return (balance, Err(fault));
+    }
+    let mut kept = [Block::default(); BLOCKS];
+    let count = without_lone(blocks, &mut kept);
+    let whole = rows(kept.get(..count).unwrap_or(&[]));
+    let (rows, weakening, saturation) = trustworthy(whole);
+    balance.weakening = weakening;
+    balance.saturation = saturation;
+    balance.left_out = blocks.len() - rows.blocks.iter().filter(|b| rows.counts(b)).count();
+    let Some(found) = rows.fit() else {
+        balance.ramp = blind_ramp(blocks);
+        return (balance, Err(Fault::of(GIB_ERR_INERTIA_EXCITATION)));
+    };
+    fill(&mut balance, &found);
+    balance.ramp = ramp(&rows, &balance, length, question);
+    let verdict = judge(&balance, &found);
+    (balance, verdict)
+}
+
+fn judge(balance: &Balance, found: &Regression) -> Result<(), Fault> {
+    let Value { value, uncertainty } = balance.inertia;
+    let excitation =
+        |value, high| Fault { code: GIB_ERR_INERTIA_EXCITATION, field: "uncertainty_ratio\0", value, low: 0.0, high };
+    if value < 0.0 && value + uncertainty < 0.0 {
+        let field = "torque\0";
+        return Err(Fault { code: GIB_ERR_INERTIA_SIGN, field, value, low: 0.0, high: f64::MAX });
+    }
+    // Where a tenth of what is left of the acceleration is noise, taking it off is no longer a small correction.
+    if found.noise_share > 0.1 {
+        return Err(Fault { field: "acceleration_noise_ratio\0", ..excitation(found.noise_share, 0.1) });
+    }
+    let ratio = uncertainty / value.abs();
+    if value <= 0.0 || ratio > WORST {
+        return Err(excitation(ratio, WORST));
+    }
+    Ok(())
+}
+
+fn rows(blocks: &[Block]) -> Rows<'_> {
+    let forward = blocks.iter().filter(|b| b.speed > 0.0).count();
+    let fewer = forward.min(blocks.len() - forward);
+    Rows {
+        blocks,
+        both_senses: fewer >= FEWEST / 2,
+        noise: acceleration_noise(blocks),
+        speed_limit: f64::MAX,
+        torque_limit: f64::MAX,
+        reported: Reported::Truly,
+    }
+}
+
+/// Copies the blocks but those whose acceleration stands alone: half of the largest away from both neighbours. A ramp
+/// has several blocks, and the corner of one lies between its neighbours; what stands alone is a wrong speed, and as a
+/// lever it would outweigh all others.
+fn without_lone(blocks: &[Block], kept: &mut [Block; BLOCKS]) -> usize {
+    let far = 0.5 * quantile(blocks, 0.95, |b| b.acceleration.abs());
+    let noise = 8.0 * acceleration_noise(blocks).sqrt();
+    let far = far.max(noise);
+    let mut n = 0;
+    for (i, block) in blocks.iter().enumerate() {
+        let beside = |j: Option<usize>| j.and_then(|j| blocks.get(j)).map_or(block.acceleration, |b| b.acceleration);
+        let (before, after) = (block.acceleration - beside(i.checked_sub(1)), block.acceleration - beside(Some(i + 1)));
+        let alone = before.abs().min(after.abs()) > far && before * after > 0.0;
+        if let (false, Some(place)) = (alone, kept.get_mut(n)) {
+            *place = *block;
+            n += 1;
+        }
+    }
+    n
+}
+
+/// Variance of the noise of the acceleration, from its second difference over neighbouring blocks, whose variance is
+/// six times as large; by the median, so that the corners of a ramp do not count.
+fn acceleration_noise(blocks: &[Block]) -> f64 {
+    const STD_PER_MAD: f64 = 1.482_602_218_505_602;
+    let mut curvature = [0.0; BLOCKS];
+    let mut n = 0;
+    for (triple, place) in blocks.windows(3).zip(curvature.iter_mut()) {
+        if let [a, b, c] = triple {
+            *place = (a.acceleration - 2.0 * b.acceleration + c.acceleration).abs();
+            n += 1;
+        }
+    }
+    let Some(seen) = curvature.get_mut(..n).filter(|seen| !seen.is_empty()) else { return 0.0 };
+    let middle = *seen.select_nth_unstable_by(n / 2, f64::total_cmp).1;
+    (STD_PER_MAD * middle).powi(2) / 6.0
+}
+
+/// Leaves out what field weakening or saturation spoils, where the blocks show either beyond chance.
+fn trustworthy(whole: Rows) -> (Rows, f64, f64) {
+    let mut rows = whole;
+    let fastest = rows.blocks.iter().map(|b| b.speed.abs()).fold(0.0, f64::max);
+    let weakening = threshold(&rows, fastest, |limit, _| Reported::Weakened(limit));
+    if weakening > 0.0 {
+        rows.speed_limit = 0.97 * weakening;
+    }
+    let strongest = quantile(rows.blocks, 0.98, |b| b.torque.abs());
+    let saturation = threshold(&rows, strongest, |limit, plain| Reported::Saturated(limit, plain.terms));
+    if saturation > 0.0 {
+        rows.torque_limit = 0.97 * saturation;
+    }
+    (rows, weakening, saturation)
+}
+
+/// The threshold, tried as shares of `largest`, from which on a corrected balance fits clearly better; 0: none does.
+fn threshold(rows: &Rows, largest: f64, reported: impl Fn(f64, &Regression) -> Reported) -> f64 {
+    let Some(plain) = rows.fit() else { return 0.0 };
+    let mut tried = [(0.0, plain); STEPS + 1];
+    for (step, place) in tried.iter_mut().skip(1).enumerate() {
+        let limit = largest * LOWEST.powf(1.0 - step as f64 / STEPS as f64);
+        if let Some(fit) = (Rows { reported: reported(limit, &plain), ..*rows }).fit() {
+            *place = (limit, fit);
+        }
+    }
+    // The noise is the least scatter that leaves nearly all blocks in; an outlier counts as four times that.
+    let all = plain.used + plain.dropped;
+    let fair = |fit: &Regression| if 5 * fit.dropped <= all { fit.scatter } else { f64::INFINITY };
+    let noise = tried.iter().map(|(_, fit)| fair(fit)).fold(f64::INFINITY, f64::min).min(plain.scatter).max(1e-12);
+    let loss = |fit: &Regression| fit.used as f64 * (fit.scatter / noise).powi(2) + 16.0 * fit.dropped as f64;
+    let best = tried.iter().fold(&tried[0], |best, next| if loss(&next.1) < loss(&best.1) { next } else { best });
+    if loss(&plain) - loss(&best.1) > EVIDENCE { best.0 } else { 0.0 }
+}
+
+/// The quantile `share` of a quantity over the blocks.
+fn quantile(blocks: &[Block], share: f64, of: impl Fn(&Block) -> f64) -> f64 {
+    let mut values = [0.0; BLOCKS];
+    blocks.iter().zip(values.iter_mut()).for_each(|(block, place)| *place = of(block));
+    let n = blocks.len().min(BLOCKS);
+    let Some(seen) = values.get_mut(..n).filter(|seen| !seen.is_empty()) else { return 0.0 };
+    *seen.select_nth_unstable_by(((n - 1) as f64 * share) as usize, f64::total_cmp).1
+}
+
+/// Whether at least a tenth of the blocks speeds up and another tenth slows down, by more than noise.
+fn both_ways(blocks: &[Block]) -> bool {
+    let clear = 0.3 * quantile(blocks, 0.98, |b| b.acceleration.abs());
+    let share = |sign: f64| blocks.iter().filter(|b| sign * b.acceleration * b.speed.signum() > clear).count();
+    10 * share(1.0) >= blocks.len() && 10 * share(-1.0) >= blocks.len()
+}
+
+/// T/ω' where the spindle clearly speeds up.
+fn naive(blocks: &[Block]) -> f64 {
+    let clear = 0.3 * quantile(blocks, 0.98, |b| b.acceleration.abs());
+    let (torque, acceleration) = blocks
+        .iter()
+        .filter(|b| b.acceleration * b.speed.signum() > clear)
+        .fold((0.0, 0.0), |sum, b| (sum.0 + b.torque.abs(), sum.1 + b.acceleration.abs()));
+    if acceleration > 0.0 { torque / acceleration } else { 0.0 }
+}
+
+/// Student's 97.5 % quantile (Cornish and Fisher's expansion about the normal one).
+fn student(freedom: f64) -> f64 {
+    const Z: f64 = 1.959_964;
+    let f = freedom.max(2.0);
+    Z + (Z.powi(3) + Z) / (4.0 * f) + (5.0 * Z.powi(5) + 16.0 * Z.powi(3) + 3.0 * Z) / (96.0 * f * f)
+}
+
+fn fill(balance: &mut Balance, found: &Regression) {
+    let t = student(found.used as f64 - 4.0);
+    let value = |i: usize| Value { value: found.terms[i], uncertainty: t * found.covariance[(i, i)].max(0.0).sqrt() };
+    balance.inertia = value(0);
+    balance.viscous = value(1);
+    balance.coulomb = value(2);
+    balance.constant = value(3);
+    balance.scatter = found.scatter;
+    balance.used = found.used;
+    balance.dropped = found.dropped;
+}
+
+/// The ramp that would reach the target. Up and down between ω₁ and ω₂ at ±a makes acceleration independent of
+/// friction, so that var J = S/(2·times·(ω₂ − ω₁)·a), S: density of the torque noise, N²m²·s.
+fn ramp(rows: &Rows, balance: &Balance, length: u32, question: &Question) -> Ramp {
+    const TIMES: f64 = 2.0;
+    let top = quantile(rows.blocks, 0.98, |b| b.speed.abs()).min(rows.speed_limit);
+    let span = 0.9 * top;
+    let density = balance.scatter.powi(2) * f64::from(length) * question.sample_s / PARABOLA;
+    let inertia = balance.inertia.value.abs().max(1e-3 * balance.inertia.uncertainty);
+    // A margin of a quarter: the noise is itself only estimated.
+    let wanted = question.target * inertia / (1.25 * student(100.0));
+    let needed = density / (2.0 * span * wanted * wanted);
+    // No slower than a quarter of what was seen, no faster than the torque seen allows.
+    let seen = quantile(rows.blocks, 0.98, |b| b.acceleration.abs());
+    let friction = (balance.coulomb.value + balance.viscous.value * top).max(0.0);
+    let strongest = quantile(rows.blocks, 0.98, |b| b.torque.abs()).min(rows.torque_limit);
+    let fastest = ((strongest - friction) / inertia).max(seen);
+    let acceleration = (needed / TIMES).clamp(0.25 * seen, fastest);
+    let times = (needed / acceleration).ceil().max(TIMES);
+    Ramp { speeds: [top - span, top], acceleration, times, torque: friction + inertia * acceleration }
+}
+
+/// The ramp to propose when nothing is known: over the speeds seen, in two seconds.
+fn blind_ramp(blocks: &[Block]) -> Ramp {
+    let top = quantile(blocks, 0.98, |b| b.speed.abs());
+    Ramp { speeds: [0.1 * top, top], acceleration: 0.45 * top, times: 2.0, torque: 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const QUESTION: Question = Question { sample_s: 1e-3, target: 0.05, own: [0.0; 2], process_step: 0 };
+
+    /// Trapezoids with J 0.3, B 0.02, Tc 4 and a scatter of 0.05.
+    fn trapezoids() -> Vec<Block> {
+        let block = |i: i32| {
+            let acceleration = match i % 40 {
+                0..15 => 60.0,
+                20..35 => -60.0,
+                _ => 0.0,
+            };
+            let speed = 30.0 + 4.0 * f64::from((i % 40).min(40 - i % 40));
+            let noise = 0.05 * (f64::from(i) * 2.7).sin();
+            Block { torque: 0.3 * acceleration + 0.02 * speed + 4.0 + noise, speed, acceleration }
+        };
+        (0..160).map(block).collect()
+    }
+
+    #[test]
+    fn wrong_speeds_are_no_levers() {
+        let mut blocks = trapezoids();
+        for i in [7, 50, 90, 131] {
+            blocks[i].acceleration = 4000.0;
+        }
+        let (balance, verdict) = fit(&blocks, 20, &QUESTION);
+        assert_eq!(verdict, Ok(()));
+        assert!((balance.inertia.value - 0.3).abs() < 2e-3 && balance.left_out == 4, "{balance:?}");
+    }
+
+    #[test]
+    fn saturation_is_found_and_left_out_and_none_is_made_up() {
+        let (clean, _) = fit(&trapezoids(), 20, &QUESTION);
+        assert!(clean.saturation == 0.0 && clean.weakening == 0.0 && clean.both_ways, "{clean:?}");
+        let mut blocks = trapezoids();
+        let limit = 15.0;
+        blocks.iter_mut().filter(|b| b.torque > limit).for_each(|b| b.torque += 0.8 * (b.torque - limit));
+        let (balance, verdict) = fit(&blocks, 20, &QUESTION);
+        assert_eq!(verdict, Ok(()));
+        assert!((balance.inertia.value - 0.3).abs() < 3e-3, "{balance:?}");
+    }
+
+    #[test]
+    fn few_blocks_and_wrong_signs_are_refused_by_name() {
+        let code = |blocks: &[Block]| fit(blocks, 20, &QUESTION).1.unwrap_err().code;
+        assert_eq!(code(&trapezoids()[..11]), GIB_ERR_INERTIA_FEW);
+        let mut turned = trapezoids();
+        turned.iter_mut().for_each(|b| b.torque = -b.torque);
+        assert_eq!(code(&turned), GIB_ERR_INERTIA_SIGN);
+        let mut steady = trapezoids();
+        steady.iter_mut().for_each(|b| b.acceleration = 0.0);
+        assert_eq!(code(&steady), GIB_ERR_INERTIA_EXCITATION);
+    }
+}

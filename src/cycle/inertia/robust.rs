@@ -1,0 +1,274 @@
+//! Linear regression on blocks that a few wrong ones do not move.
+//!
+//! Starts at least squares, goes by least absolute values to Tukey's biweight, drops what lies further out than chance
+//! explains and ends at least squares on the rest (reweighted least squares; Rousseeuw & Leroy 1987). The acceleration
+//! is itself measured: its noise variance is taken off the normal matrix, else inertia would read low (errors in
+//! variables; Fuller 1987). The covariance allows for residuals that scatter unequally and hang together (Newey & West
+//! 1987), since torque ripple does both.
+
+use super::blocks::{BLOCKS, Block};
+use nalgebra::{Matrix4, Vector4};
+
+/// Terms of the balance: acceleration, speed, sense, constant.
+pub const TERMS: usize = 4;
+/// Residuals beyond this many standard deviations are not chance: 1 in 15 000 if they are normal.
+const FAR: f64 = 4.0;
+/// Standard deviation of a normal distribution over its median absolute deviation.
+const STD_PER_MAD: f64 = 1.482_602_218_505_602;
+/// Tukey's constant for 95 % efficiency on normal residuals.
+const BIWEIGHT: f64 = 4.685;
+const ITERATIONS: usize = 12;
+
+/// What the blocks are regressed on, and which of them count.
+#[derive(Debug, Clone, Copy)]
+pub struct Rows<'a> {
+    /// The blocks in order of time.
+    pub blocks: &'a [Block],
+    /// True where the spindle turned both ways, so that a constant torque can be told from Coulomb friction.
+    pub both_senses: bool,
+    /// Variance of the acceleration's noise, (rad/s²)².
+    pub noise: f64,
+    /// Highest |speed| that counts, rad/s.
+    pub speed_limit: f64,
+    /// Highest |torque| that counts, N·m.
+    pub torque_limit: f64,
+    /// How the torque is reported.
+    pub reported: Reported,
+}
+
+/// By which factor a drive may report more torque than the motor delivers.
+#[derive(Debug, Clone, Copy)]
+pub enum Reported {
+    /// As delivered.
+    Truly,
+    /// By |ω|/limit above a speed, rad/s: the field is weakened.
+    Weakened(f64),
+    /// By |T|/limit above a torque, N·m, judged by the balance given: the motor saturates.
+    Saturated(f64, Vector4<f64>),
+}
+
+/// A fitted balance.
+#[derive(Debug, Clone, Copy)]
+pub struct Regression {
+    /// J, B, Tc, T0.
+    pub terms: Vector4<f64>,
+    /// Their covariance.
+    pub covariance: Matrix4<f64>,
+    /// Standard deviation of a block's torque about the fit, N·m.
+    pub scatter: f64,
+    /// Blocks that the result rests on.
+    pub used: usize,
+    /// Blocks dropped as outliers.
+    pub dropped: usize,
+    /// Share of the acceleration's variance, free of the other terms, that is noise.
+    pub noise_share: f64,
+}
+
+impl Rows<'_> {
+    /// The regressors of a block.
+    #[must_use]
+    pub fn row(&self, block: &Block) -> Vector4<f64> {
+        let constant = if self.both_senses { 1.0 } else { 0.0 };
+        let row = Vector4::new(block.acceleration, block.speed, block.speed.signum(), constant);
+        match self.reported {
+            Reported::Truly => row,
+            Reported::Weakened(limit) => row * (block.speed.abs() / limit).max(1.0),
+            Reported::Saturated(limit, terms) => row * (terms.dot(&row).abs() / limit).max(1.0),
+        }
+    }
+
+    /// Whether a block is within the limits.
+    #[must_use]
+    pub fn counts(&self, block: &Block) -> bool {
+        block.speed.abs() <= self.speed_limit && block.torque.abs() <= self.torque_limit
+    }
+
+    fn unknowns(&self) -> usize {
+        if self.both_senses { 4 } else { 3 }
+    }
+
+    /// Residuals of the blocks that count.
+    fn residuals(&self, terms: &Vector4<f64>, out: &mut [f64; BLOCKS]) -> usize {
+        let mut n = 0;
+        for (block, place) in self.blocks.iter().filter(|b| self.counts(b)).zip(out.iter_mut()) {
+            *place = block.torque - terms.dot(&self.row(block));
+            n += 1;
+        }
+        n
+    }
+
+    /// Inverse of the normal matrix and the solution under weights by residual.
+    fn solve(&self, weight: impl Fn(&Block) -> f64) -> Option<(Matrix4<f64>, Vector4<f64>)> {
+        let mut normal = Matrix4::zeros();
+        let mut right = Vector4::zeros();
+        let mut sum = 0.0;
+        for block in self.blocks.iter().filter(|b| self.counts(b)) {
+            let (row, w) = (self.row(block), weight(block));
+            normal += w * row * row.transpose();
+            right += w * block.torque * row;
+            sum += w;
+        }
+        normal[(0, 0)] -= sum * self.noise;
+        if !self.both_senses {
+            normal[(3, 3)] = 1.0;
+        }
+        let inverse = inverse(&normal)?;
+        Some((inverse, inverse * right))
+    }
+
+    /// The robust fit; `None` when the blocks do not determine the terms.
+    #[must_use]
+    pub fn fit(&self) -> Option<Regression> {
+        let (_, mut terms) = self.solve(|_| 1.0)?;
+        let mut residuals = [0.0; BLOCKS];
+        for round in 0..2 * ITERATIONS {
+            let n = self.residuals(&terms, &mut residuals);
+            if n <= self.unknowns() {
+                return None;
+            }
+            let scale = self.scale(&mut residuals, n);
+            let next = self.solve(|block| {
+                let r = (block.torque - terms.dot(&self.row(block))).abs() / scale;
+                match round {
+                    ..ITERATIONS => 1.0 / r.max(0.1),
+                    _ if r < BIWEIGHT => (1.0 - (r / BIWEIGHT).powi(2)).powi(2),
+                    _ => 0.0,
+                }
+            });
+            terms = next?.1;
+        }
+        let n = self.residuals(&terms, &mut residuals);
+        let far = FAR * self.scale(&mut residuals, n);
+        let near = |block: &Block| (block.torque - terms.dot(&self.row(block))).abs() <= far;
+        self.finish(near, n)
+    }
+
+    /// Robust standard deviation of the first `n` residuals, which are reordered; never zero.
+    fn scale(&self, residuals: &mut [f64; BLOCKS], n: usize) -> f64 {
+        let Some(seen) = residuals.get_mut(..n) else { return f64::MIN_POSITIVE };
+        seen.iter_mut().for_each(|r| *r = r.abs());
+        // The fit makes as many residuals small as it has unknowns.
+        let rank = ((n + self.unknowns()) / 2).min(n.saturating_sub(1));
+        let middle = if n > 0 { *seen.select_nth_unstable_by(rank, f64::total_cmp).1 } else { 0.0 };
+        (STD_PER_MAD * middle).max(1e-12)
+    }
+
+    /// Least squares on the blocks that `near` lets through.
+    fn finish(&self, near: impl Fn(&Block) -> bool, n: usize) -> Option<Regression> {
+        let (inverse, terms) = self.solve(|block| if near(block) { 1.0 } else { 0.0 })?;
+        let residual = |block: &Block| block.torque - terms.dot(&self.row(block));
+        let counted = || self.blocks.iter().filter(|b| self.counts(b) && near(b));
+        let used = counted().count();
+        let freedom = used.checked_sub(self.unknowns()).filter(|f| *f > 0)? as f64;
+        let squares: f64 = counted().map(|b| residual(b) * residual(b)).sum();
+        let scatter = (squares / freedom).sqrt();
+        // Half the lag window that Newey and West give for this many blocks, at least two neighbours.
+        let lags = ((4.0 * (used as f64 / 100.0).powf(2.0 / 9.0)) as usize).max(2);
+        let mut meat = Matrix4::zeros();
+        let mut past = [Vector4::zeros(); 16];
+        for (i, block) in counted().enumerate() {
+            let score = residual(block) * self.row(block);
+            meat += score * score.transpose();
+            for lag in 1..=lags.min(i).min(past.len() - 1) {
+                let weight = 1.0 - lag as f64 / (lags as f64 + 1.0);
+                let cross = score * past[(i - lag) % past.len()].transpose();
+                meat += weight * (cross + cross.transpose());
+            }
+            past[i % past.len()] = score;
+        }
+        let sandwich = inverse * meat * inverse * (used as f64 / freedom);
+        let plain = inverse * (squares / freedom);
+        // A short record can make the sandwich too lucky; it is never believed below plain least squares.
+        let covariance = if sandwich[(0, 0)] > plain[(0, 0)] { sandwich } else { plain };
+        let free = 1.0 / (inverse[(0, 0)] * used as f64);
+        let noise_share = self.noise / (self.noise + free);
+        Some(Regression { terms, covariance, scatter, used, dropped: n - used, noise_share })
+    }
+}
+
+/// Inverse of a symmetric positive definite matrix, scaled first; `None` when it is as good as singular.
+fn inverse(normal: &Matrix4<f64>) -> Option<Matrix4<f64>> {
+    const SINGULAR: f64 = 1e-10;
+    let diagonal = normal.diagonal();
+    if !diagonal.iter().all(|d| *d > 0.0 && d.is_finite()) {
+        return None;
+    }
+    let scale = Matrix4::from_diagonal(&diagonal.map(|d| 1.0 / d.sqrt()));
+    let cholesky = (scale * normal * scale).cholesky()?;
+    let smallest = cholesky.l().diagonal().min();
+    (smallest * smallest > SINGULAR).then(|| scale * cholesky.inverse() * scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(blocks: &[Block]) -> Rows<'_> {
+        Rows {
+            blocks,
+            both_senses: false,
+            noise: 0.0,
+            speed_limit: f64::MAX,
+            torque_limit: f64::MAX,
+            reported: Reported::Truly,
+        }
+    }
+
+    fn exact(j: f64, b: f64, tc: f64) -> Vec<Block> {
+        let block = |i: i32| {
+            let (speed, acceleration) = (50.0 + f64::from(i % 40), if i % 80 < 40 { 60.0 } else { -60.0 });
+            Block { torque: j * acceleration + b * speed + tc, speed, acceleration }
+        };
+        (0..160).map(block).collect()
+    }
+
+    #[test]
+    fn exact_blocks_give_exact_terms() {
+        let blocks = exact(0.3, 0.02, 4.0);
+        let fit = rows(&blocks).fit().unwrap();
+        assert!((fit.terms - Vector4::new(0.3, 0.02, 4.0, 0.0)).norm() < 1e-9, "{:?}", fit.terms);
+        assert!(fit.scatter < 1e-9 && fit.dropped == 0);
+    }
+
+    #[test]
+    fn a_quarter_of_wrong_blocks_is_dropped() {
+        let mut blocks = exact(0.3, 0.02, 4.0);
+        for (i, block) in blocks.iter_mut().enumerate() {
+            block.torque += 0.05 * (i as f64 * 2.7).sin(); // so that the scale is not zero
+            if i % 4 == 1 {
+                block.torque += 30.0 + i as f64;
+            }
+        }
+        let fit = rows(&blocks).fit().unwrap();
+        assert!((fit.terms[0] - 0.3).abs() < 1e-3, "{:?}", fit.terms);
+        assert_eq!(fit.dropped, 40);
+    }
+
+    #[test]
+    fn one_ramp_at_one_torque_determines_nothing() {
+        // ω' = a − b·ω is what constant torque gives: the three terms lie in one plane.
+        let block = |i: i32| {
+            let acceleration = 60.0 * (-f64::from(i) * 0.05).exp();
+            Block { torque: 5.0, speed: 100.0 - acceleration, acceleration }
+        };
+        let blocks: Vec<Block> = (0..60).map(block).collect();
+        assert!(rows(&blocks).fit().is_none());
+    }
+
+    #[test]
+    fn noise_of_the_acceleration_does_not_make_inertia_small() {
+        let mut state = 5u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        let mut blocks: Vec<Block> = (0..3).flat_map(|_| exact(0.3, 0.02, 4.0)).collect();
+        let width = 60.0; // uniform noise of ±30 on ±60
+        blocks.iter_mut().for_each(|b| b.acceleration += width * uniform());
+        let noise = width * width / 12.0;
+        let plain = rows(&blocks).fit().unwrap();
+        let right = Rows { noise, ..rows(&blocks) }.fit().unwrap();
+        assert!(plain.terms[0] < 0.3 * 0.95, "{:?}", plain.terms);
+        assert!((right.terms[0] - 0.3).abs() < 0.3 * 0.02, "{:?}", right.terms);
+    }
+}

@@ -1,0 +1,174 @@
+//! The speed command: period and amplitude kept, power and torque never exceeded, every way out.
+
+use super::config::*;
+use super::io::*;
+use super::machine::SpeedVariation;
+use super::plan::Plan;
+use crate::cycle::backlash::io::GIB_INPUT_ABORT;
+use crate::error::*;
+use crate::units::rad_s_from_rpm;
+use proptest::prelude::*;
+
+fn config() -> SpeedVariationConfig {
+    SpeedVariationConfig {
+        struct_size: size_of::<SpeedVariationConfig>() as u32,
+        cycle_s: 0.001,
+        speed_rpm: 1000.0,
+        amplitude_ratio: 0.3,
+        period_s: 2.0,
+        inertia_kg_m2: 0.5,
+        power_w: 1e4,
+        ..SpeedVariationConfig::default()
+    }
+}
+
+fn asked(speed_rpm: f64) -> SpeedVariationInput {
+    SpeedVariationInput { speed_rpm, ..SpeedVariationInput::default() }
+}
+
+fn started(config: &SpeedVariationConfig) -> SpeedVariation {
+    let mut machine = SpeedVariation::default();
+    machine.start(Plan::to_start(config)).unwrap();
+    machine
+}
+
+#[test]
+fn amplitude_and_period_are_kept_over_a_hundred_periods() {
+    for waveform in [GIB_SPEED_VARIATION_TRIANGLE, GIB_SPEED_VARIATION_SINE] {
+        for period_s in [0.7313, 2.0] {
+            let mut machine = started(&SpeedVariationConfig { waveform, period_s, amplitude_ratio: 0.2, ..config() });
+            let (mut low, mut high, mut crossings) = (f64::MAX, 0.0f64, vec![]);
+            let mut last = 1000.0;
+            for cycle in 0..(102.0 * period_s / 0.001) as usize {
+                let speed = machine.step(&asked(1000.0)).speed_command_rpm;
+                if cycle as f64 * 0.001 > 2.0 * period_s {
+                    (low, high) = (low.min(speed), high.max(speed));
+                    if last < 1000.0 && speed >= 1000.0 {
+                        crossings.push(cycle as f64 + (1000.0 - last) / (speed - last));
+                    }
+                }
+                last = speed;
+            }
+            let period = (crossings[crossings.len() - 1] - crossings[0]) / (crossings.len() - 1) as f64 * 0.001;
+            assert!((period / period_s - 1.0).abs() < 1e-4, "{waveform} {period}");
+            assert!((low - 800.0).abs() < 2.0 && (high - 1200.0).abs() < 2.0, "{waveform} {low} {high}");
+            assert!(low >= 800.0 - 1e-6 && high <= 1200.0 + 1e-6);
+        }
+    }
+}
+
+/// The source's example: exactly the motor's power at the top, and the print's 1.88 times it.
+#[test]
+fn power_at_the_top_is_all_of_the_motor_and_no_more() {
+    let peak = |config: &SpeedVariationConfig| {
+        let mut machine = started(config);
+        let step = |machine: &mut SpeedVariation| {
+            let out = machine.step(&asked(1000.0));
+            out.torque_nm * rad_s_from_rpm(out.speed_command_rpm)
+        };
+        (0..8000).map(|_| step(&mut machine)).fold(0.0, f64::max)
+    };
+    let possible = Plan::new(&config()).unwrap().limits().amplitude_ratio;
+    let ours = peak(&SpeedVariationConfig { amplitude_ratio: possible, ..config() });
+    let formula = GIB_SPEED_VARIATION_PUBLISHED;
+    let published = peak(&SpeedVariationConfig { amplitude_ratio: 0.9, formula, ..config() });
+    println!("power at the top: ours {:.4} P, published {:.3} P", ours / 1e4, published / 1e4);
+    assert!(ours <= 1e4 && ours >= 0.97e4, "{ours}");
+    assert!((published / 1e4 - 1.88).abs() < 0.01, "{published}");
+}
+
+#[test]
+fn a_stop_ends_at_the_mean_speed_and_an_abort_likewise() {
+    for (flags, status) in [(GIB_SPEED_VARIATION_STOP, GIB_DONE), (GIB_INPUT_ABORT, GIB_ERR_ABORTED)] {
+        for waveform in [0, 1] {
+            let mut machine = started(&SpeedVariationConfig { waveform, ..config() });
+            for _ in 0..1234 {
+                machine.step(&asked(1000.0));
+            }
+            machine.step(&SpeedVariationInput { flags, ..asked(1000.0) });
+            let cycles = (0..3000).find(|_| machine.step(&asked(1000.0)).status != GIB_BUSY).unwrap();
+            assert_eq!(machine.output().status, status);
+            assert!((machine.output().speed_command_rpm - 1000.0).abs() < 1e-6, "{cycles}");
+        }
+    }
+}
+
+#[test]
+fn more_than_possible_on_the_run_is_cut_and_said() {
+    let mut machine = started(&config());
+    machine.step(&asked(1000.0));
+    assert_eq!(machine.output().message, 0);
+    machine.step(&SpeedVariationInput { amplitude_ratio: 0.9, ..asked(1000.0) });
+    let out = *machine.output();
+    assert_eq!((out.status, out.message), (GIB_BUSY, GIB_ERR_SPEED_VARIATION_POWER));
+    assert!((out.amplitude_ratio - 0.578).abs() < 1e-3 && out.amplitude_limit_ratio == out.amplitude_ratio);
+    assert!((out.period_limit_s / (2.0 * 0.9 * 1.9 / (0.578 * 1.578)) - 1.0).abs() < 0.01, "{out:?}");
+    let fault = machine.step(&asked(-1000.0)).message;
+    assert_eq!(fault, GIB_ERR_SPEED_VARIATION_SPEED, "the other sense is refused");
+}
+
+#[test]
+fn bad_inputs_end_at_the_mean_speed() {
+    for bad in [
+        asked(f64::NAN),
+        SpeedVariationInput { amplitude_ratio: f64::INFINITY, ..asked(1000.0) },
+        SpeedVariationInput { period_s: -1.0, ..asked(1000.0) },
+        SpeedVariationInput { cutting_nm: f64::NAN, ..asked(1000.0) },
+    ] {
+        let mut machine = started(&config());
+        for _ in 0..300 {
+            machine.step(&asked(1000.0));
+        }
+        machine.step(&bad);
+        for _ in 0..3000 {
+            assert!(machine.step(&bad).speed_command_rpm.is_finite());
+        }
+        assert!(machine.output().status < 0 && machine.fault().code == machine.output().status);
+        let speed = machine.output().speed_command_rpm;
+        assert!((speed - if bad.speed_rpm.is_nan() { 1000.0 } else { bad.speed_rpm }).abs() < 1e-6);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    /// Amplitude, period, speed and cutting torque change at random cycles: torque, power and speed stay within
+    /// the motor's, and no cycle's change is more than they allow.
+    #[test]
+    fn never_beyond_the_limits_whatever_changes(
+        changes in proptest::collection::vec((1..800usize, 300.0..2000.0f64, 0.0..0.9f64, 0.1..5.0f64, 0.0..30.0f64), 1..12),
+        waveform in 0..2i32, coulomb in 0.0..10.0f64, viscous in 0.0..0.05f64, sense: bool,
+    ) {
+        let sign = if sense { 1.0 } else { -1.0 };
+        let config = SpeedVariationConfig {
+            waveform, coulomb_nm: coulomb, viscous_nm_s: viscous, torque_nm: 120.0, speed_max_rpm: 2500.0,
+            speed_min_rpm: 100.0, amplitude_ratio: 0.01, speed_rpm: sign * 1000.0, ..config()
+        };
+        let mut machine = started(&config);
+        let mut last = f64::NAN;
+        for (cycles, speed, amplitude_ratio, period_s, cutting_nm) in changes {
+            let input = SpeedVariationInput { amplitude_ratio, period_s, cutting_nm, ..asked(sign * speed) };
+            for cycle in 0..cycles {
+                let out = *machine.step(&input);
+                prop_assert_eq!(out.status, GIB_BUSY);
+                let omega = rad_s_from_rpm(out.speed_command_rpm * sign);
+                // In the cycle of a change the load is that of before.
+                if last.is_finite() && cycle > 0 {
+                    let change = omega - last;
+                    let friction = coulomb + viscous * omega;
+                    let rise = 0.5 * change / 0.001 + friction + cutting_nm;
+                    if change > 1e-12 {
+                        prop_assert!(rise <= 120.0 + 1e-6 && rise * omega <= 1e4 * (1.0 + 1e-9), "{} {}", rise, omega);
+                    }
+                    let brake = 0.5 * change / 0.001 + friction;
+                    if change < -1e-12 {
+                        prop_assert!(brake >= -120.0 - 1e-6 && brake * omega >= -1e4 * (1.0 + 1e-3), "{} {}", brake, omega);
+                    }
+                    prop_assert!((out.torque_nm * sign - 0.5 * change / 0.001).abs() < 1e-6);
+                    let most = rad_s_from_rpm(2500.0);
+                    prop_assert!(omega <= most * (1.0 + 1e-9) && omega >= rad_s_from_rpm(100.0) * (1.0 - 1e-9));
+                }
+                last = omega;
+            }
+        }
+    }
+}
