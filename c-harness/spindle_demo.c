@@ -3,7 +3,7 @@
  * published limit would draw from the motor and what gib's does, and what the variation is good for.
  */
 #include "gib.h"
-#include "spindle.h"
+#include "spindle_plant.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -2,7 +2,7 @@
  * Family `inertia` from C: measured on a simulated spindle, refused where it should be, and every pointer checked.
  */
 #include "gib.h"
-#include "spindle.h"
+#include "spindle_plant.h"
 
 #include <math.h>
 #include <setjmp.h>

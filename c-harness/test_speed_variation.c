@@ -2,7 +2,7 @@
  * Family `speed_variation` from C: the limits, the command on a simulated spindle with a power meter, and every pointer.
  */
 #include "gib.h"
-#include "spindle.h"
+#include "spindle_plant.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -6,8 +6,8 @@
  *   drive    PI speed loop and torque feed-forward once a cycle, first-order current loop, torque limit
  *   turning  m·x'' + c·x' + k·x = Kf·depth·(h0 + x(one revolution ago) − x(now)), Altintas, Manufacturing Automation
  */
-#ifndef SPINDLE_H
-#define SPINDLE_H
+#ifndef SPINDLE_PLANT_H
+#define SPINDLE_PLANT_H
 
 #include <stdint.h>
 

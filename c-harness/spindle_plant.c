@@ -1,5 +1,5 @@
-/* See spindle.h. */
-#include "spindle.h"
+/* See spindle_plant.h. */
+#include "spindle_plant.h"
 
 #include <math.h>
 #include <stdlib.h>
