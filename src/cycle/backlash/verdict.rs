@@ -204,12 +204,11 @@ impl Sense {
 }
 
 /// Variance that no repetition takes away, mm²: each end of the lost motion lies somewhere on the encoder's grid q,
-/// the same in every repeat (2·q²/12), a kink somewhere in its bin of the curve, and in step mode the motor stands
-/// somewhere in a step when the torque is read.
+/// the same in every repeat (2·q²/12), a kink somewhere in its bin of the curve, and in step mode a motor with friction
+/// of its own sticks somewhere in its step when the torque is read (step²/12), and does so alike in every repeat.
 fn systematic(plan: &Plan, encoder: f64) -> f64 {
-    const STEP_SHARE: f64 = 0.15;
-    let step = if plan.slow_feed { 0.0 } else { STEP_SHARE * plan.step };
-    encoder * encoder / 6.0 + plan.bin * plan.bin / 24.0 + step * step
+    let step = if plan.slow_feed { 0.0 } else { plan.step };
+    encoder * encoder / 6.0 + plan.bin * plan.bin / 24.0 + step * step / 12.0
 }
 
 /// Estimates of both senses and their mean; a sense that was not measured is all zero.
