@@ -23,6 +23,13 @@ pub fn quantile(values: &[f64], share: f64) -> Option<f64> {
     Some(*finite.select_nth_unstable_by(rank, f64::total_cmp).1)
 }
 
+/// Standard deviation of a sample; 0 for fewer than two values.
+pub fn deviation(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt()
+}
+
 /// Standard deviation of white noise on a smooth signal, in the signal's unit: the fourth difference removes what a cubic
 /// follows within five rows, and white noise of standard deviation s leaves it with s·√70.
 /// (von Neumann's mean square successive difference, one order higher, with a median in place of the mean.)

@@ -10,8 +10,8 @@
 use super::pair::{Pair, Place, Unusable, by_place, compare, places};
 use super::sweeps::{Sample, Sweep, Track};
 use super::time_skew::{Skew, from_places, from_sweep};
-use super::{Refusal, Value};
-use crate::analysis::statistics::{correlated_mean, grid, student_95};
+use super::{Refusal, SPEED_RATIO, Value};
+use crate::analysis::statistics::{correlated_mean, deviation, grid, student_95};
 use crate::recording::{Recording, RecordingError, Signal, Unit, file_row};
 
 /// One reversal.
@@ -88,8 +88,6 @@ pub struct LostMotion {
 
 /// Stretches the stroke is cut into for the table along it.
 const STRETCHES: usize = 10;
-/// Reversals up to this many times faster than the slowest are used: steady slow motion is what defines lost motion.
-const SPEED_RATIO: f64 = 3.0;
 /// A gap of more rows than this ends a piece: the axis may have turned round unseen.
 const LONGEST_GAP_ROWS: f64 = 20.0;
 
@@ -292,12 +290,6 @@ fn leave_out_fast(found: &mut [Found]) {
     for one in found.iter_mut().filter(|f| f.pair.is_ok() && f.speed_sum > SPEED_RATIO * slowest) {
         one.pair = Err(Unusable::Fast);
     }
-}
-
-fn deviation(values: &[f64]) -> f64 {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt()
 }
 
 /// The value with its uncertainty, and the part that the delay makes.

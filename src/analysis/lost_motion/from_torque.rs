@@ -9,26 +9,17 @@
 //! the clearance, and where the recording goes a few µm back and forth while the table sticks. Where neither is there, it is
 //! taken as 20 ± 20 % of the friction, and the uncertainty says so.
 
+pub use super::motor_friction::MotorFriction;
+use super::motor_friction::{Friction, motor_friction};
 use super::sweeps::{Sample, Sweep, Track};
-use super::{Refusal, Value};
-use crate::analysis::statistics::{Mean, correlated_mean, grid, quantile, student_95};
+use super::{Refusal, SPEED_RATIO, Value};
+use crate::analysis::statistics::{Mean, correlated_mean, deviation, grid, quantile, student_95};
 use crate::cycle::backlash::curve::Curve;
 use crate::cycle::backlash::fit::{Fit, Fitted, Levels};
 use crate::cycle::backlash::verdict::check_reversal;
 use crate::error::status_text;
 use crate::machine::Axis;
 use crate::recording::{Recording, RecordingError, Signal, Unit, file_row};
-
-/// How friction on the motor's side was found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MotorFriction {
-    /// From going back and forth while the table sticks.
-    Probe,
-    /// From the level across the clearance.
-    Clearance,
-    /// Not seen: 20 ± 20 % of the friction is taken.
-    Assumed,
-}
 
 /// What the torque curve of one reversal gives. Lengths in mm or degrees, efforts in N·m or N.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,6 +88,7 @@ pub fn estimate(recording: &Recording, channel: &str, model: Option<&Axis>) -> R
     if turns.is_empty() {
         return Err(Refusal::NoReversal);
     }
+    leave_out_fast(&mut turns);
     let first: Vec<Fitted> = turns.iter().filter_map(|turn| turn.fit(0.0, 0.0).ok()).collect();
     let lost: Vec<f64> = first.iter().map(|fitted| fitted.lost_motion).collect();
     let Some(about) = quantile(&lost, 0.5) else {
@@ -121,9 +113,9 @@ pub fn estimate(recording: &Recording, channel: &str, model: Option<&Axis>) -> R
 }
 
 /// An unbroken piece of the recording, with the effort in the place of the difference.
-struct Piece {
+pub(super) struct Piece {
     track: Track,
-    sweeps: Vec<Sweep>,
+    pub(super) sweeps: Vec<Sweep>,
     rows: Vec<usize>,
     resolution: f64,
 }
@@ -153,14 +145,16 @@ fn pieces(recording: &Recording, channel: &str, model: Option<&Axis>) -> Result<
 }
 
 /// A reversal with what its fit needs.
-struct Turn {
+pub(super) struct Turn {
     row: usize,
     time_s: f64,
     position: f64,
     direction: f64,
     /// Travel since the reversal and effort in the new sense, in order of time.
     samples: Vec<(f64, f64)>,
-    levels: Result<(Mean, Mean), String>,
+    pub(super) levels: Result<(Mean, Mean), String>,
+    /// Speed after the reversal, 1/s.
+    speed: f64,
     /// The shorter of the ways before and after.
     way: f64,
     resolution: f64,
@@ -202,6 +196,7 @@ impl Piece {
             direction,
             samples,
             levels,
+            speed: after.top_speed,
             way: before.way().min(after.way()),
             resolution: self.resolution,
             result: Err(String::new()),
@@ -227,7 +222,7 @@ fn usual_levels(pieces: &[Piece]) -> [f64; 2] {
 /// The effort of sliding in a sweep, in the sense of `direction`; `None` where the axis does not slide as it usually does: a
 /// short way in which the drive only winds up is steady too, but is no sliding.
 fn sliding(sweep: &Sweep, direction: f64, usual: [f64; 2]) -> Option<Mean> {
-    const LIKE: f64 = 0.25;
+    const LIKE: f64 = 0.2; // less than from the sliding level to that of a motor that rubs alone, with 55 % of the friction
     let mean = steady(sweep)?;
     let expected = usual[usize::from(sweep.direction > 0.0)];
     let like = (mean.value - expected).abs() <= LIKE * (usual[1] - usual[0]).abs();
@@ -247,86 +242,19 @@ fn steady(sweep: &Sweep) -> Option<Mean> {
     if steady.len() < FEWEST_ROWS { None } else { correlated_mean(&steady) }
 }
 
-/// Friction on the motor's side, and its standard error; with no evidence a share of the sliding friction.
-struct Friction {
-    value: Option<(f64, f64)>,
-}
-
-impl Friction {
-    /// For a reversal whose effort changes by `change`.
-    fn at(&self, change: f64) -> (f64, f64) {
-        // Even over 0 to 40 % of half the change.
-        self.value.unwrap_or((0.1 * change, 0.2 * change / 12f64.sqrt()))
-    }
-}
-
-/// The fewest bins that the clearance must span for its level to show the motor's friction.
-const CLEARANCE_SHARE: f64 = 0.15;
-
-fn motor_friction(pieces: &[Piece], turns: &[Turn], about: f64) -> (Friction, MotorFriction) {
-    let probes: Vec<f64> = pieces.iter().flat_map(|piece| probes(piece, about)).collect();
-    if let Some(found) = mean_of(&probes) {
-        return (Friction { value: Some(found) }, MotorFriction::Probe);
-    }
-    let level = |turn: &Turn| {
-        let fitted = turn.fit(0.0, 0.0).ok()?;
-        let (before, after) = turn.levels.as_ref().ok()?;
-        let wide = fitted.clearance > CLEARANCE_SHARE * fitted.lost_motion && fitted.clearance > 4.0 * turn.width();
-        wide.then(|| (fitted.level - 0.5 * (before.value + after.value)).max(0.0))
-    };
-    let levels: Vec<f64> = turns.iter().filter_map(level).collect();
-    match mean_of(&levels) {
-        Some(found) => (Friction { value: Some(found) }, MotorFriction::Clearance),
-        None => (Friction { value: None }, MotorFriction::Assumed),
-    }
-}
-
-/// Mean and its standard error; `None` for fewer than two values.
-fn mean_of(values: &[f64]) -> Option<(f64, f64)> {
-    let n = values.len() as f64;
-    (values.len() > 1).then(|| (values.iter().sum::<f64>() / n, deviation(values) / n.sqrt()))
-}
-
-/// The motor's friction from each short way back and forth: half the distance of two parallel lines of effort over position.
-fn probes(piece: &Piece, about: f64) -> Vec<f64> {
-    const FEWEST_ROWS: usize = 10;
-    let one = |ways: &[Sweep]| {
-        let [into, ends @ ..] = ways else { return None };
-        // Only the first way back, from where the table slid, and the way forth again: then the table has not moved between.
-        let short = ends[0].way() < 0.6 * about && into.way() > 1.5 * ends[0].way();
-        if !short || ends[1].way() < 0.9 * ends[0].way() {
-            return None;
-        }
-        let back: Vec<&Sample> = ends[0].moving.iter().collect();
-        let (low, high) =
-            back.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(s.motor), h.max(s.motor)));
-        let edge = 0.25 * (high - low);
-        let inside = |s: &&Sample| s.motor > low + edge && s.motor < high - edge;
-        let back: Vec<&Sample> = back.into_iter().filter(inside).collect();
-        let forth: Vec<&Sample> = ends[1].moving.iter().filter(inside).collect();
-        if back.len() < FEWEST_ROWS || forth.len() < FEWEST_ROWS {
-            return None;
-        }
-        Some(0.5 * ends[1].direction * apart(&back, &forth)).filter(|friction| *friction >= 0.0)
-    };
-    piece.sweeps.windows(3).filter_map(one).collect()
-}
-
-/// How far the second line lies above the first, both with one slope.
-fn apart(first: &[&Sample], second: &[&Sample]) -> f64 {
-    let mean = |of: &[&Sample], value: fn(&Sample) -> f64| of.iter().map(|s| value(s)).sum::<f64>() / of.len() as f64;
-    let centre = |of: &[&Sample]| (mean(of, |s| s.motor), mean(of, |s| s.difference));
-    let (a, b) = (centre(first), centre(second));
-    let sums = |of: &[&Sample], (x, y): (f64, f64)| {
-        of.iter().fold((0.0, 0.0), |(xx, xy), s| (xx + (s.motor - x).powi(2), xy + (s.motor - x) * (s.difference - y)))
-    };
-    let ((xx, xy), (uu, uv)) = (sums(first, a), sums(second, b));
-    let slope = (xy + uv) / (xx + uu).max(f64::MIN_POSITIVE);
-    b.1 - a.1 - slope * (b.0 - a.0)
-}
-
 /// Bins over the way to sliding.
 const BINS: f64 = 200.0;
+
+/// Sets aside reversals at much more than the slowest speed: there the torque also moves masses.
+fn leave_out_fast(turns: &mut [Turn]) {
+    let speeds: Vec<Option<f64>> = turns.iter().map(|turn| turn.fit(0.0, 0.0).ok().map(|_| turn.speed)).collect();
+    let slowest = speeds.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+    for (turn, speed) in turns.iter_mut().zip(speeds) {
+        if speed.is_some_and(|speed| speed > SPEED_RATIO * slowest) {
+            turn.levels = Err("much faster than the slowest reversal".into());
+        }
+    }
+}
 
 impl Turn {
     /// Travel at which the effort has first come near the sliding level after the reversal.
@@ -342,11 +270,11 @@ impl Turn {
         })
     }
 
-    fn width(&self) -> f64 {
+    pub(super) fn width(&self) -> f64 {
         (1.5 * self.rise().unwrap_or(0.0) / BINS).max(self.resolution)
     }
 
-    fn fit(&self, motor: f64, motor_error: f64) -> Result<Fitted, String> {
+    pub(super) fn fit(&self, motor: f64, motor_error: f64) -> Result<Fitted, String> {
         let (before, after) = self.levels.as_ref().map_err(Clone::clone)?;
         let change = after.value - before.value;
         if change <= 5.0 * before.error.hypot(after.error) {
@@ -416,12 +344,6 @@ impl Turn {
             curve: curve.into_iter().filter(|sums| sums.0 > 0.0).map(|(n, s, t)| (s / n, t / n)).collect(),
         }
     }
-}
-
-fn deviation(values: &[f64]) -> f64 {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt()
 }
 
 /// Mean over the reversals, each sense counted alike. The variance is the larger of what the fits expect and what the

@@ -6,6 +6,7 @@
 
 pub mod from_positions;
 pub mod from_torque;
+mod motor_friction;
 mod pair;
 mod sweeps;
 mod time_skew;
@@ -13,6 +14,9 @@ mod time_skew;
 use std::fmt;
 
 use crate::recording::RecordingError;
+
+/// Reversals up to this many times faster than the slowest are used: steady slow motion is what defines lost motion.
+const SPEED_RATIO: f64 = 3.0;
 
 /// Lost motion with its expanded uncertainty (k = 2, about 95 %), both in the unit of the result.
 #[derive(Debug, Clone, Copy, PartialEq)]
