@@ -47,7 +47,7 @@ fn recording(extra: impl Fn(f64, f64, f64, f64) -> f64) -> Recording {
 }
 
 fn judged(recording: &Recording) -> Diagnosis {
-    diagnose(&axis(), recording, None, &|_| true).unwrap()
+    diagnose(&axis(), recording, None, &|_, _| true).unwrap()
 }
 
 /// The cause is named alone, and each parameter is within `tolerance` of the truth, relative.
@@ -130,7 +130,7 @@ fn too_little_data_is_said_with_what_is_missing() {
 
 #[test]
 fn it_stops_when_told_to() {
-    let stopped = diagnose(&axis(), &recording(|_, _, v, _| 0.1 * v.signum()), None, &|_| false);
+    let stopped = diagnose(&axis(), &recording(|_, _, v, _| 0.1 * v.signum()), None, &|_, _| false);
     assert_eq!(stopped.err(), Some(Stopped));
 }
 
@@ -141,7 +141,7 @@ fn an_extended_machine_survives_its_file_and_answers_no_discrepancy() {
     let mut machine = Machine::parse(MACHINE).unwrap();
     machine.axes[0] = d.extended;
     let again = Machine::parse(&machine.to_json().to_string()).unwrap();
-    assert_eq!(diagnose(&again.axes[0], &r, None, &|_| true).unwrap().verdict, Verdict::NoDiscrepancy);
+    assert_eq!(diagnose(&again.axes[0], &r, None, &|_, _| true).unwrap().verdict, Verdict::NoDiscrepancy);
 }
 
 fn data(path: &str) -> Option<PathBuf> {
@@ -161,7 +161,7 @@ fn the_clean_rig_is_clean() {
         return;
     };
     let axis = Machine::load(&machine).unwrap().axes.remove(0);
-    let d = diagnose(&axis, &Recording::open(&recording).unwrap(), None, &|_| true).unwrap();
+    let d = diagnose(&axis, &Recording::open(&recording).unwrap(), None, &|_, _| true).unwrap();
     assert_eq!(d.verdict, Verdict::NoDiscrepancy, "{:?}", d.findings);
 }
 
@@ -169,7 +169,7 @@ fn the_clean_rig_is_clean() {
 fn emps_shows_timing_direction_dip_and_ripple_and_not_what_it_has_not() {
     let (Some(machine), Some(recording)) = (data("emps/machine.json"), data("emps/emps.csv")) else { return };
     let axis = Machine::load(&machine).unwrap().axes.remove(0);
-    let d = diagnose(&axis, &Recording::open(&recording).unwrap(), None, &|_| true).unwrap();
+    let d = diagnose(&axis, &Recording::open(&recording).unwrap(), None, &|_, _| true).unwrap();
     let of = |cause: Cause| d.findings.iter().find(|f| f.effect.cause() == cause).map(|f| f.effect.values());
     let delay = of(Cause::DeadTime).unwrap()[0];
     assert!((-1.6..-0.3).contains(&delay), "{delay}");

@@ -1,14 +1,17 @@
 //! `gib diagnose`: what the simulation gets wrong, why, and what knowing it is worth.
 
 use std::fmt::Write;
+use std::io::IsTerminal;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use gib::diagnosis::{Diagnosis, Verdict, diagnose};
-use gib::machine::Machine;
 use gib::recording::Recording;
 
-use super::{Answer, Result};
+use super::table::Table;
+use super::{Answer, Result, machine_file};
 
 /// Names what a simulation gets wrong about a machine, from a recording
 #[derive(Args)]
@@ -36,7 +39,10 @@ pub struct Diagnose {
     /// Write the machine file here, extended by what was found
     #[arg(long)]
     machine_out: Option<PathBuf>,
-    /// Say on standard error how far the work is
+    /// Draw the residual against everything it may go with into this folder, as residual_<axis>.svg
+    #[arg(long, value_name = "DIR")]
+    plot: Option<PathBuf>,
+    /// Say on standard error how far the work is; on a terminal this is done anyway when it takes long
     #[arg(long)]
     progress: bool,
 }
@@ -44,7 +50,7 @@ pub struct Diagnose {
 impl Diagnose {
     /// Diagnoses the recording.
     pub fn run(&self) -> Result {
-        let mut machine = Machine::load(&self.machine)?;
+        let mut machine = machine_file::load(&self.machine)?;
         let recording = Recording::open(&self.recording)?;
         let holdout = self.holdout.as_deref().map(Recording::open).transpose()?;
         let channels = recording.channels();
@@ -57,17 +63,24 @@ impl Diagnose {
             )
             .into());
         };
-        let watch = |share: f64| {
-            if self.progress {
-                eprintln!("gib diagnose: {:.0} %", 100.0 * share);
-            }
-            true
-        };
-        let Ok(diagnosis) = diagnose(axis, &recording, holdout.as_ref(), &watch) else {
+        if let Some(holdout) = &holdout {
+            gib::diagnosis::usable(holdout, axis)?;
+        }
+        let meter = Meter::new(self.progress);
+        let Ok(diagnosis) = diagnose(axis, &recording, holdout.as_ref(), &|share, stage| meter.show(share, stage))
+        else {
             return Err("stopped".into());
         };
+        meter.clear();
         if let Some(file) = &self.json {
             std::fs::write(file, format!("{:#}\n", diagnosis.to_json()))
+                .map_err(|e| format!("{}: {e}", file.display()))?;
+        }
+        if let Some(folder) = &self.plot {
+            let picture = gib::report::residual::picture(&diagnosis)?;
+            let file = folder.join(format!("residual_{}.svg", axis.name));
+            std::fs::create_dir_all(folder)
+                .and_then(|()| std::fs::write(&file, picture))
                 .map_err(|e| format!("{}: {e}", file.display()))?;
         }
         *axis = diagnosis.extended.clone();
@@ -97,10 +110,19 @@ fn text(d: &Diagnosis) -> String {
     for line in &d.missing {
         let _ = writeln!(text, "  missing: {line}");
     }
-    if d.verdict != Verdict::InsufficientData && d.verdict != Verdict::NoDiscrepancy {
-        let shown: Vec<String> =
-            d.shown.iter().take(4).map(|(name, share)| format!("{name} {:.0} %", 100.0 * share)).collect();
-        let _ = writeln!(text, "\nThe departure goes with (share of its variance): {}", shown.join(", "));
+    for note in &d.notes {
+        let _ = writeln!(text, "  note: {note}");
+    }
+    if !d.shown.is_empty() {
+        text.push_str("\nShare of the residual's variance that goes with each coordinate:\n");
+        let mut table = Table::new(["", "as believed", "in the end"], 1);
+        let mut shown: Vec<_> = d.shown.iter().collect();
+        shown.sort_by(|a, b| b.before.total_cmp(&a.before));
+        for view in shown {
+            let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+            table.row([view.coordinate.name().to_owned(), percent(view.before), percent(view.after)]);
+        }
+        text += &table.text();
     }
     for (i, finding) in d.findings.iter().enumerate() {
         let _ = writeln!(
@@ -150,6 +172,42 @@ fn text(d: &Diagnosis) -> String {
         );
     }
     text
+}
+
+/// Says how far the work is, where it was asked for, or where someone sits at a terminal and it takes more than a second.
+struct Meter {
+    always: bool,
+    terminal: bool,
+    begin: Instant,
+    /// Percent shown last.
+    shown: AtomicU32,
+}
+
+impl Meter {
+    fn new(always: bool) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        Self { always, terminal, begin: Instant::now(), shown: AtomicU32::new(u32::MAX) }
+    }
+
+    fn show(&self, share: f64, stage: &str) -> bool {
+        let percent = (100.0 * share) as u32;
+        let due = self.always || self.terminal && self.begin.elapsed() > Duration::from_secs(1);
+        if due && self.shown.swap(percent, Ordering::Relaxed) != percent {
+            if self.terminal {
+                eprint!("\r\x1b[K{percent:3} % {stage}");
+            } else {
+                eprintln!("{percent:3} % {stage}");
+            }
+        }
+        true
+    }
+
+    /// Leaves a clean line.
+    fn clear(&self) {
+        if self.terminal && self.shown.load(Ordering::Relaxed) != u32::MAX {
+            eprint!("\r\x1b[K");
+        }
+    }
 }
 
 /// Two significant digits.

@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use gib::machine::Axis;
-use gib::plant::closed_loop::{fill_rest, replay};
+use gib::plant::closed_loop::predict;
 use gib::plant::observed::Observed;
-use gib::plant::predict::predict_torque;
 use gib::recording::{Recording, Signal};
 use serde_json::{Map, Value, json};
 
@@ -73,13 +72,9 @@ struct Predicted<'a> {
 impl<'a> Predicted<'a> {
     fn of(axis: &'a Axis, recording: &Recording) -> std::result::Result<Self, Box<dyn std::error::Error>> {
         let observed = Observed::of(recording, axis)?;
-        let mut prediction = predict_torque(axis, &observed)?;
-        let replayed = replay(axis, &observed, &prediction)?;
-        if let Some(replayed) = &replayed {
-            fill_rest(&mut prediction, &observed, replayed);
-        }
-        let position = replayed.map(|replayed| replayed.position);
-        let (torque, phases_unknown) = (prediction.torque, prediction.phases_unknown);
+        let prediction = predict(axis, &observed)?;
+        let position = prediction.closed_loop.map(|replayed| replayed.position);
+        let (torque, phases_unknown) = (prediction.torque.torque, prediction.torque.phases_unknown);
         Ok(Self { axis, observed, torque, phases_unknown, position })
     }
 

@@ -2,13 +2,23 @@
 
 use super::frame::Columns;
 use crate::machine::Axis;
-use crate::recording::{Recording, RecordingError, Signal, Unit};
+use crate::plant::observed::Observed;
+use crate::recording::{Column, Recording, RecordingError, Signal, Unit};
 use std::ops::Range;
 
 /// Most rows that are worked on; of longer recordings, evenly spread stretches.
-const MOST_ROWS: usize = 1_000_000;
+const MOST_ROWS: usize = 480_000;
 /// Stretches that a longer recording is cut to.
-const PIECES: usize = 50;
+const PIECES: usize = 48;
+/// Rows are averaged until there are no more than this many a second: the friction, ripple and resonance of a machine tool's
+/// axis lie well below half of it, and what is above it is the current loop's.
+const ROWS_A_SECOND: f64 = 1000.0;
+
+/// A column and the factor that brings it to the unit of the model.
+struct Source<'a> {
+    values: &'a [f64],
+    factor: f64,
+}
 
 impl Columns {
     /// The columns of an axis.
@@ -19,52 +29,115 @@ impl Columns {
         let load = if axis.drive.is_rotary() { Unit::Deg } else { Unit::Mm };
         let (torque_signal, torque_unit) =
             if axis.drive.is_linear() { (Signal::Force, Unit::N) } else { (Signal::Torque, Unit::Nm) };
-        let convert = |signal: Signal, unit: Unit| {
-            let column = recording.column(&axis.name, signal)?;
-            column.to(unit).ok_or_else(|| {
+        let convert = |column: &'_ Column, unit: Unit| {
+            let factor = column.label.as_ref().and_then(|label| label.unit.factor_to(unit));
+            factor.ok_or_else(|| {
                 let message = format!("must be in {} or a unit that converts to it", unit.suffix());
                 RecordingError::new(&recording.file, message).in_column(&column.name)
             })
         };
-        let position = convert(Signal::Position, load)?;
-        let torque = convert(torque_signal, torque_unit)?;
-        let optional = |signal: Signal| recording.get(&axis.name, signal).map(|_| convert(signal, load)).transpose();
-        let table = optional(Signal::TablePosition)?;
-        let command = optional(Signal::PositionCommand)?;
+        let source = |signal: Signal, unit: Unit| {
+            let column = recording.column(&axis.name, signal)?;
+            Ok::<_, RecordingError>(Source { values: &column.values, factor: convert(column, unit)? })
+        };
+        let optional = |signal| recording.get(&axis.name, signal).map(|_| source(signal, load)).transpose();
+        let position = source(Signal::Position, load)?;
+        let torque = source(torque_signal, torque_unit)?;
+        let (table, command) = (optional(Signal::TablePosition)?, optional(Signal::PositionCommand)?);
         let mut whole =
             vec![recording.column(&axis.name, Signal::Position)?, recording.column(&axis.name, torque_signal)?];
         whole.extend(recording.get(&axis.name, Signal::TablePosition));
-        let runs = spread(recording.runs(&whole));
+        let runs = recording.runs(&whole);
+        let rows: usize = runs.iter().map(ExactSizeIterator::len).sum();
+        let runs = spread(runs);
         let period_s = recording.sampling.period_s;
+        let judged: usize = runs.iter().map(ExactSizeIterator::len).sum();
         let mut out = Columns {
-            time_s: Vec::new(),
-            position: Vec::new(),
-            torque: Vec::new(),
-            command: command.as_ref().map(|_| Vec::new()),
-            table: table.as_ref().map(|_| Vec::new()),
+            time_s: Vec::with_capacity(judged),
+            position: Vec::with_capacity(judged),
+            torque: Vec::with_capacity(judged),
+            command: command.as_ref().map(|_| Vec::with_capacity(judged)),
+            table: table.as_ref().map(|_| Vec::with_capacity(judged)),
             stretches: Vec::new(),
             period_s,
+            recorded_period_s: period_s,
+            left_out: rows - judged,
         };
         for run in runs {
             let start = out.time_s.len();
             let times = &recording.time_s[run.clone()];
             let even = if recording.sampling.regular { None } else { Some(even_times(times, period_s)) };
-            let take = |values: &[f64]| match &even {
-                None => values[run.clone()].to_vec(),
-                Some(wanted) => interpolate(times, &values[run.clone()], wanted),
+            let take = |to: &mut Vec<f64>, from: &Source| {
+                let values = &from.values[run.clone()];
+                match &even {
+                    None => to.extend(values.iter().map(|v| v * from.factor)),
+                    Some(wanted) => to.extend(interpolate(times, values, wanted).map(|v| v * from.factor)),
+                }
             };
-            out.position.extend(take(&position));
-            out.torque.extend(take(&torque));
+            take(&mut out.position, &position);
+            take(&mut out.torque, &torque);
             if let (Some(to), Some(from)) = (&mut out.table, &table) {
-                to.extend(take(from));
+                take(to, from);
             }
             if let (Some(to), Some(from)) = (&mut out.command, &command) {
-                to.extend(take(from));
+                take(to, from);
             }
-            out.time_s.extend(even.clone().unwrap_or_else(|| times.to_vec()));
+            match even {
+                Some(even) => out.time_s.extend(even),
+                None => out.time_s.extend_from_slice(times),
+            }
             out.stretches.push(start..out.time_s.len());
         }
         Ok(out)
+    }
+
+    /// What a reader must know of the rows that are not among these.
+    pub(super) fn note(&self) -> Vec<String> {
+        let (used, all) = (self.time_s.len(), self.time_s.len() + self.left_out);
+        let text = || {
+            format!("{all} rows are more than are worked on: {used} of them were, in {PIECES} evenly spread stretches")
+        };
+        if self.left_out > 0 { vec![text()] } else { Vec::new() }
+    }
+
+    /// The same columns as the simulation sees a recording; `None` where no stretch is long enough for a motion.
+    #[must_use]
+    pub fn observed(&self) -> Option<Observed> {
+        let copy = Columns::clone(self);
+        Observed::from_columns(copy.time_s, copy.position, copy.torque, copy.command, copy.table, copy.stretches)
+    }
+
+    /// The columns with so many rows averaged to one that no more than a thousand a second are left.
+    #[must_use]
+    pub fn thinned(self) -> Columns {
+        let many = (1.0 / (ROWS_A_SECOND * self.period_s) + 0.01).floor() as usize;
+        if many < 2 {
+            return self;
+        }
+        let mut stretches = Vec::new();
+        let mut end = 0;
+        for s in &self.stretches {
+            stretches.push(end..end + s.len() / many);
+            end += s.len() / many;
+        }
+        let mean = |values: &[f64]| -> Vec<f64> {
+            let of = |s: &Range<usize>| {
+                let whole = values[s.clone()].chunks_exact(many);
+                // About the first value, so that a far position loses no digits.
+                whole.map(|c| c[0] + c.iter().map(|v| v - c[0]).sum::<f64>() / many as f64).collect::<Vec<f64>>()
+            };
+            self.stretches.iter().flat_map(of).collect()
+        };
+        Columns {
+            time_s: mean(&self.time_s),
+            position: mean(&self.position),
+            torque: mean(&self.torque),
+            command: self.command.as_deref().map(mean),
+            table: self.table.as_deref().map(mean),
+            stretches,
+            period_s: self.period_s * many as f64,
+            ..self
+        }
     }
 }
 
@@ -92,20 +165,17 @@ fn even_times(times: &[f64], period_s: f64) -> Vec<f64> {
     (0..count).map(|i| first + i as f64 * period_s).collect()
 }
 
-fn interpolate(times: &[f64], values: &[f64], wanted: &[f64]) -> Vec<f64> {
+fn interpolate<'a>(times: &'a [f64], values: &'a [f64], wanted: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
     let mut row = 0;
-    wanted
-        .iter()
-        .map(|&t| {
-            while row + 2 < times.len() && times[row + 1] < t {
-                row += 1;
-            }
-            let next = (row + 1).min(times.len() - 1);
-            let span = times[next] - times[row];
-            let share = if span > 0.0 { ((t - times[row]) / span).clamp(0.0, 1.0) } else { 0.0 };
-            values[row] + share * (values[next] - values[row])
-        })
-        .collect()
+    wanted.iter().map(move |&t| {
+        while row + 2 < times.len() && times[row + 1] < t {
+            row += 1;
+        }
+        let next = (row + 1).min(times.len() - 1);
+        let span = times[next] - times[row];
+        let share = if span > 0.0 { ((t - times[row]) / span).clamp(0.0, 1.0) } else { 0.0 };
+        values[row] + share * (values[next] - values[row])
+    })
 }
 
 #[cfg(test)]
@@ -119,5 +189,26 @@ mod tests {
         assert!(total <= MOST_ROWS + MOST_ROWS / PIECES && total > MOST_ROWS * 9 / 10, "{total}");
         assert!(runs.first().is_some_and(|r| r.start == 0) && runs.last().is_some_and(|r| r.end > 14_000_000));
         assert_eq!(spread(vec![0..10, 20..30]), vec![0..10, 20..30]);
+    }
+
+    #[test]
+    fn fast_rows_are_averaged_in_time_and_value_alike() {
+        let rows: Vec<f64> = (0..1003).map(f64::from).collect();
+        let columns = Columns {
+            time_s: rows.iter().map(|i| i * 2.5e-4).collect(),
+            position: rows.iter().map(|i| 1e3 + i * 0.5).collect(),
+            torque: rows.clone(),
+            command: None,
+            table: None,
+            stretches: vec![0..402, 402..1003],
+            period_s: 2.5e-4,
+            recorded_period_s: 2.5e-4,
+            left_out: 0,
+        };
+        let thin = columns.thinned();
+        assert_eq!((thin.stretches.clone(), thin.period_s, thin.torque.len()), (vec![0..100, 100..250], 1e-3, 250));
+        for ((t, x), torque) in thin.time_s.iter().zip(&thin.position).zip(&thin.torque) {
+            assert!((t / 2.5e-4 - torque).abs() < 1e-9 && ((x - 1e3) / 0.5 - torque).abs() < 1e-9);
+        }
     }
 }

@@ -64,6 +64,9 @@ fn mean(values: &mut [f64], width: usize, scratch: &mut Vec<f64>) {
     }
 }
 
+/// Weights of [`simpson`].
+pub const SIMPSON: [f64; 3] = [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0];
+
 /// The mean over one row to either side of the straight lines between rows: (1, 4, 1)/6. A central difference of positions
 /// is just this mean of the speed, and a second difference the triangular one of the acceleration.
 #[must_use]

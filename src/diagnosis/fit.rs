@@ -6,6 +6,8 @@
 
 use super::causes::{Law, Rest, Scale, Term, Trace};
 use super::frame::Frame;
+use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// A recording as one system of equations.
@@ -79,12 +81,15 @@ impl<'f, 'a> Bench<'f, 'a> {
         column
     }
 
-    /// A cause at given non-linear parameters.
+    /// A cause at given non-linear parameters, once for each set of them.
     #[must_use]
-    pub fn part(&self, law: &'static Law, shape: Vec<f64>) -> Part {
-        let Term { fixed, regressors } = (law.term)(self.frame, &shape);
-        let columns = regressors.iter().map(|trace| self.stack(trace)).collect();
-        Part { law, shape, fixed: fixed.map(|trace| self.stack(&trace).into()), columns }
+    pub fn parts(&self, law: &'static Law, shapes: Vec<Vec<f64>>) -> Vec<Part> {
+        let terms = (law.terms)(self.frame, &shapes);
+        let part = |(shape, Term { fixed, regressors }): (Vec<f64>, Term)| {
+            let columns = regressors.iter().map(|trace| self.stack(trace)).collect();
+            Part { law, shape, fixed: fixed.map(|trace| self.stack(&trace).into()), columns }
+        };
+        shapes.into_iter().zip(terms).map(part).collect()
     }
 
     /// What is left, channel by channel, in their own units; rows of the torque by their weight.
@@ -192,7 +197,8 @@ impl<'f, 'a> Bench<'f, 'a> {
                 }
                 moved.dedup();
                 for i in moved {
-                    parts[i] = self.part(parts[i].law, parts[i].shape.clone());
+                    let shape = vec![parts[i].shape.clone()];
+                    parts[i] = self.parts(parts[i].law, shape).swap_remove(0);
                 }
                 let next = self.fit(parts);
                 if next.squares() < before {
@@ -211,11 +217,54 @@ impl<'f, 'a> Bench<'f, 'a> {
         fit
     }
 
+    /// The coefficients that the rows outside some blocks give, at the same non-linear parameters.
+    #[must_use]
+    pub fn coefficients_without(&self, fit: &Fit, left_out: impl Fn(usize) -> bool) -> Vec<Vec<f64>> {
+        let basis = &fit.basis;
+        let (k, free) = (basis.len(), self.free.len());
+        let columns: Vec<&Vec<f64>> = fit.parts.iter().flat_map(|part| part.columns.iter()).collect();
+        if columns.is_empty() {
+            return fit.coefficients.clone();
+        }
+        // On an orthonormal basis U the rest of the rows gives t − (1 − U_bᵀ·U_b)⁻¹·U_bᵀ·r_b in place of t = Uᵀ·y.
+        let mut normal = DMatrix::<f64>::identity(k, k);
+        let mut right = DVector::<f64>::zeros(k);
+        let blocks = self.frame.blocks.windows(2).enumerate().filter(|(block, _)| left_out(*block));
+        for (_, ends) in blocks {
+            for piece in self.pieces(ends[0]..ends[1]) {
+                for i in 0..k {
+                    right[i] += dot(&basis[i][piece.clone()], &fit.residual[piece.clone()]);
+                    for j in 0..k {
+                        normal[(i, j)] -= dot(&basis[i][piece.clone()], &basis[j][piece.clone()]);
+                    }
+                }
+            }
+        }
+        // A direction of which the other rows know nothing stays as it was.
+        let change = normal.pseudo_inverse(1e-3).unwrap_or_else(|_| DMatrix::zeros(k, k)) * right;
+        let triangle = DMatrix::from_fn(columns.len(), columns.len(), |i, j| dot(&basis[free + i], columns[j]));
+        let change = DVector::from_fn(columns.len(), |i, _| change[free + i]);
+        let change =
+            triangle.pseudo_inverse(1e-12).map_or_else(|_| DVector::zeros(columns.len()), |inverse| inverse * change);
+        let mut change = change.iter();
+        fit.coefficients.iter().map(|own| own.iter().map(|c| c - change.next().unwrap_or(&0.0)).collect()).collect()
+    }
+
+    /// The stacked rows of a block: those of the torque and, with a table scale, those of table − encoder.
+    #[must_use]
+    pub fn pieces(&self, block: Range<usize>) -> Vec<Range<usize>> {
+        let table = block.start + self.rows..block.end + self.rows;
+        if self.measured.len() > self.rows { vec![block, table] } else { vec![block] }
+    }
+
     /// How the model's sum changes with each non-linear parameter (in the units of its scale).
     #[must_use]
     pub fn slopes(&self, fit: &Fit, first: usize) -> Vec<Slope> {
         let mut slopes = Vec::new();
         for (i, part) in fit.parts.iter().enumerate().skip(first) {
+            // Up and down by a small step in each parameter, all worked out together.
+            let mut shapes = Vec::new();
+            let mut moves = Vec::new();
             for (index, scale) in part.law.scales.iter().enumerate() {
                 let step = match *scale {
                     Scale::Choice => continue,
@@ -223,12 +272,17 @@ impl<'f, 'a> Bench<'f, 'a> {
                     Scale::Linear(_, _, step) => step,
                 };
                 let at = part.shape[index];
-                let shifted = |by: f64| {
+                let (above, below) = (scale.moved(at, step), scale.moved(at, -step));
+                for value in [above, below] {
                     let mut shape = part.shape.clone();
-                    shape[index] = scale.moved(at, by);
-                    (self.part(part.law, shape.clone()), scale.distance(at, shape[index]))
-                };
-                let ((up, above), (down, below)) = (shifted(step), shifted(-step));
+                    shape[index] = value;
+                    shapes.push(shape);
+                }
+                moves.push((index, scale.distance(at, above), scale.distance(at, below)));
+            }
+            let mut sides = self.parts(part.law, shapes).into_iter();
+            for (index, above, below) in moves {
+                let (Some(up), Some(down)) = (sides.next(), sides.next()) else { break };
                 if above - below <= 0.0 {
                     continue;
                 }

@@ -4,12 +4,13 @@
 //! nothing; rows whose filter touches a rest that the encoder cannot resolve are left out. Everything is in the motor's
 //! coordinate and the drive's own unit (N·m, rad; N, m), positions in load units (mm; degree).
 //!
-//! Timing: the servo's output is held for a cycle and the motor follows with a lag τ. Seen at the rows, a step of the output
-//! stands h/(1 − e^(−h/τ)) − h/2 after it, while the mean torque follows it by τ: the column is late by the difference,
-//! half a cycle without lag. This is known from the machine file and taken off before any dead time is looked for.
+//! Timing: how late the torque column is by the servo's sampling alone is known from the machine file
+//! ([`sampling_shift_s`]) and taken off before any dead time is looked for.
 
-use super::filter::{LowPass, convolve, norm, simpson};
-use crate::machine::{Axis, Belief};
+use super::filter::{LowPass, SIMPSON, convolve, norm, simpson};
+use super::fit::dot;
+use crate::machine::{Axis, Belief, Effect};
+use crate::plant::predict::sampling_shift_s;
 use std::ops::Range;
 
 /// Plain columns of one axis: what a diagnosis needs of a recording.
@@ -29,6 +30,10 @@ pub struct Columns {
     pub stretches: Vec<Range<usize>>,
     /// Row period, s.
     pub period_s: f64,
+    /// Period of the rows as recorded, s.
+    pub recorded_period_s: f64,
+    /// Whole rows of the recording that are not among these, because it is longer than is worked on.
+    pub left_out: usize,
 }
 
 /// Most rows on which causes are compared; more are thinned evenly, which costs time and gains nothing.
@@ -59,7 +64,7 @@ pub struct Frame<'a> {
     pub direction: Vec<f64>,
     /// The encoder's grid, load units.
     pub grid: f64,
-    /// By how much the torque column is late by construction of the servo, s.
+    /// By how much the torque column is late by sampling and as believed, s.
     pub known_delay_s: f64,
     /// Rows that are judged.
     pub kept: Vec<usize>,
@@ -73,8 +78,9 @@ pub struct Frame<'a> {
     pub speed: Vec<f64>,
     /// Filtered torque of every row, not aligned.
     torque: Vec<f64>,
-    /// Deviation of the filtered torque noise that independent noise of unit deviation makes.
-    pub noise_gain: f64,
+    /// Weights of the whole filter of the torque balance, and of that of table − encoder; odd.
+    kernel: Vec<f64>,
+    table_kernel: Vec<f64>,
 }
 
 impl<'a> Frame<'a> {
@@ -101,16 +107,18 @@ impl<'a> Frame<'a> {
         let resting = resting_rows(columns, resolution);
         let direction = direction_of(columns, &v, &a, resolution);
         let torque = low_pass.run(&simpson(&columns.torque, stretches), stretches);
+        let table_kernel = low_pass.kernel();
+        let kernel = convolve(&table_kernel, &SIMPSON);
         let doubt = low_pass.run(&doubtful_rows(columns, resting, resolution), stretches);
         let level = belief.coulomb.max(1e-3 * typical(&columns.torque)) / torque_noise.max(1e-300);
-        let kernel_norm = norm(&low_pass.kernel());
+        let kernel_norm = norm(&table_kernel);
         let weight_of = |row: usize| 1.0 / (1.0 + (level * doubt[row] / kernel_norm).powi(2)).sqrt();
-        let kept =
-            judged_rows(columns, low_pass.reach() + 3, low_pass.width / 2 + 1, |row| weight_of(row) > LEAST_WEIGHT);
+        // Room for the filter and for reading between rows.
+        let margin = low_pass.reach() + 5;
+        let kept = judged_rows(columns, margin, low_pass.width / 2 + 1, |row| weight_of(row) > LEAST_WEIGHT);
         let mut weights: Vec<f64> = kept.iter().map(|&row| weight_of(row)).collect();
         let mean = (weights.iter().map(|w| w * w).sum::<f64>() / weights.len().max(1) as f64).sqrt();
         weights.iter_mut().for_each(|w| *w /= mean.max(LEAST_WEIGHT));
-        let noise_gain = norm(&convolve(&low_pass.kernel(), &[1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0]));
         let blocks = (0..=BLOCKS).map(|b| b * kept.len() / BLOCKS).collect();
         let acceleration = kept.iter().map(|&i| a[i] * unit).collect();
         let speed = kept.iter().map(|&i| v[i] * unit).collect();
@@ -124,30 +132,38 @@ impl<'a> Frame<'a> {
             v,
             direction,
             grid,
-            known_delay_s: known_delay(axis, h),
+            known_delay_s: sampling_shift_s(axis, columns.recorded_period_s) + believed_delay(axis),
             kept,
             weights,
             blocks,
             acceleration,
             speed,
             torque,
-            noise_gain,
+            kernel,
+            table_kernel,
         }
     }
 
     /// A regressor of every row, filtered like the torque, at the judged rows.
     #[must_use]
     pub fn judged(&self, values: &[f64]) -> Vec<f64> {
-        let stretches = &self.columns.stretches;
-        let filtered = self.low_pass.run(&simpson(values, stretches), stretches);
-        self.kept.iter().map(|&i| filtered[i]).collect()
+        self.weighed(values, &self.kernel, 0)
     }
 
     /// A column of table − encoder, filtered, at the judged rows.
     #[must_use]
     pub fn judged_table(&self, values: &[f64]) -> Vec<f64> {
-        let filtered = self.low_pass.run(values, &self.columns.stretches);
-        self.kept.iter().map(|&i| filtered[i]).collect()
+        self.weighed(values, &self.table_kernel, 0)
+    }
+
+    /// Weighted sum of the rows about each judged row, `offset` rows later. The rows that are not judged are not worked out.
+    fn weighed(&self, values: &[f64], kernel: &[f64], offset: isize) -> Vec<f64> {
+        let first = offset - (kernel.len() / 2) as isize;
+        let at = |&row: &usize| {
+            let begin = row.saturating_add_signed(first);
+            values.get(begin..begin + kernel.len()).map_or(0.0, |window| dot(window, kernel))
+        };
+        self.kept.iter().map(at).collect()
     }
 
     /// table − encoder at the judged rows; empty without a table scale.
@@ -162,10 +178,14 @@ impl<'a> Frame<'a> {
     /// A function of the measured torque, filtered and aligned as the torque is.
     #[must_use]
     pub fn aligned(&self, values: &[f64]) -> Vec<f64> {
-        let stretches = &self.columns.stretches;
-        let filtered = self.low_pass.run(&simpson(values, stretches), stretches);
         let shift = self.known_delay_s / self.columns.period_s;
-        self.kept.iter().map(|&i| cubic_at(&filtered, i as f64 + shift)).collect()
+        let (rows, between) = (shift.floor(), shift - shift.floor());
+        // Catmull and Rom's weights at that place between rows −1, 0, 1 and 2, with a fifth that makes the kernel odd.
+        let unit =
+            |k: usize| cubic_at(&[0.0, 1.0, 2.0, 3.0].map(|i| f64::from(u8::from(i == k as f64))), 1.0 + between);
+        let weights = [unit(0), unit(1), unit(2), unit(3)];
+        let kernel = convolve(&self.kernel, &[0.0, weights[0], weights[1], weights[2], weights[3]]);
+        self.weighed(values, &kernel, rows as isize)
     }
 
     /// The regressor that a function of the row gives.
@@ -187,12 +207,9 @@ impl<'a> Frame<'a> {
     #[must_use]
     pub fn floor(&self, values: &[f64], averaged: bool) -> f64 {
         let stride = self.kept.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(1);
-        let mut kernel = self.low_pass.kernel();
-        if averaged {
-            kernel = convolve(&kernel, &[1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0]);
-        }
+        let kernel = if averaged { &self.kernel } else { &self.table_kernel };
         let correlation = |lag: usize| {
-            kernel.iter().zip(kernel.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>() / norm(&kernel).powi(2)
+            kernel.iter().zip(kernel.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>() / norm(kernel).powi(2)
         };
         let at_spacing = |m: usize| {
             let gain = (6.0 - 8.0 * correlation(m * stride) + 2.0 * correlation(2 * m * stride)).max(1e-6).sqrt();
@@ -256,15 +273,13 @@ fn cubic_at(values: &[f64], index: f64) -> f64 {
     crate::plant::motion::cubic_at(values, index)
 }
 
-/// How late a logged torque column is against the mean torque, s (see the head of this file). Only where rows are cycles.
-fn known_delay(axis: &Axis, period_s: f64) -> f64 {
-    let Some(servo) = &axis.servo else { return 0.0 };
-    let (h, lag) = (servo.period_s, servo.torque_time_constant_s);
-    if (h / period_s - 1.0).abs() > 0.01 {
-        return 0.0;
-    }
-    let held = if lag > 0.0 { h / (1.0 - (-h / lag).exp()) } else { h };
-    held - 0.5 * h - lag
+/// How late the torque column is believed to be beyond its sampling, s.
+fn believed_delay(axis: &Axis) -> f64 {
+    let delay = |effect: &Effect| match *effect {
+        Effect::DeadTime { delay_ms } => Some(1e-3 * delay_ms),
+        _ => None,
+    };
+    axis.effects.iter().filter_map(delay).sum()
 }
 
 /// Applies a three-point rule to the position inside each stretch; end rows repeat their neighbour.

@@ -1,12 +1,12 @@
-//! What the extended machine is worth on rows it was not fitted to.
+//! What the extended machine is worth on rows it was not fitted to, by the prediction that `gib predict` makes.
 
+use super::belief;
 use super::fit::{Bench, Fit};
-use super::select::held_out;
-use crate::machine::Axis;
-use crate::plant::closed_loop::replay;
+use super::frame::Columns;
+use super::progress::{Stopped, Watch};
+use crate::machine::{Axis, Effect};
+use crate::plant::closed_loop::predict;
 use crate::plant::observed::Observed;
-use crate::plant::predict::predict_torque;
-use crate::recording::Recording;
 
 /// RMS before and after, on rows that were not fitted.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,60 +21,89 @@ pub struct Gain {
     pub ci95: [f64; 2],
 }
 
-/// The gains of an extended axis: on the hold-out as `gib predict` predicts it, else torque on held-out blocks of the same
-/// recording.
-#[must_use]
-pub fn gains(
-    axis: &Axis,
-    extended: &Axis,
-    holdout: Option<&Recording>,
-    bench: &Bench,
-    empty: &Fit,
-    fit: &Fit,
-) -> Vec<Gain> {
-    if let Some(holdout) = holdout {
-        if let Some(gains) = on_holdout(axis, extended, holdout) {
-            return gains;
-        }
-    }
-    let (before, after) = (held_out(bench, empty), held_out(bench, fit));
-    let sizes: Vec<f64> = bench.frame.blocks.windows(2).map(|w| (w[1] - w[0]) as f64).collect();
-    let (before_rms, after_rms, ci95) = ratio_of(&before, &after, &sizes);
-    let floor = bench.floors[0];
-    vec![Gain { channel: axis.drive.torque_word(), before: floor * before_rms, after: floor * after_rms, ci95 }]
-}
-
 /// Errors of one machine on a recording: torque, closed-loop position, table position; NaN where not predicted.
-struct Errors {
-    torque: Vec<f64>,
-    position: Option<Vec<f64>>,
-    table: Option<Vec<f64>>,
-}
-
-fn on_holdout(axis: &Axis, extended: &Axis, holdout: &Recording) -> Option<Vec<Gain>> {
-    let observed = Observed::of(holdout, axis).ok()?;
-    let (before, after) = (errors(axis, &observed)?, errors(extended, &observed)?);
-    let mut gains = vec![gain(axis.drive.torque_word(), &before.torque, &after.torque)?];
-    if let (Some(before), Some(after)) = (&before.position, &after.position) {
-        gains.extend(gain("position", before, after));
-    }
-    if let (Some(before), Some(after)) = (&before.table, &after.table) {
-        gains.extend(gain("table_position", before, after));
-    }
-    Some(gains)
-}
+type Errors = [Option<Vec<f64>>; 3];
 
 fn errors(axis: &Axis, observed: &Observed) -> Option<Errors> {
-    let prediction = predict_torque(axis, observed).ok()?;
+    let prediction = predict(axis, observed).ok()?;
     let less =
         |measured: &[f64], model: &[f64]| -> Vec<f64> { measured.iter().zip(model).map(|(m, p)| m - p).collect() };
-    // A closed loop that cannot be replayed (no servo, no command) is no reason to withhold the torque.
-    let replayed = replay(axis, observed, &prediction).ok().flatten();
-    Some(Errors {
-        torque: less(&observed.torque, &prediction.torque),
-        position: replayed.as_ref().map(|r| less(&observed.position, &r.position)),
-        table: replayed.as_ref().zip(observed.table_position.as_ref()).map(|(r, t)| less(t, &r.table_position)),
-    })
+    let replayed = prediction.closed_loop.as_ref();
+    Some([
+        Some(less(&observed.torque, &prediction.torque.torque)),
+        replayed.map(|r| less(&observed.position, &r.position)),
+        replayed.zip(observed.table_position.as_ref()).map(|(r, t)| less(t, &r.table_position)),
+    ])
+}
+
+/// The gains on a recording that was not fitted.
+///
+/// # Errors
+/// [`Stopped`] when the watch's caller said so.
+pub fn on_holdout(axis: &Axis, extended: &Axis, observed: &Observed, watch: &Watch) -> Result<Vec<Gain>, Stopped> {
+    let both = watch.each(&[axis, extended], (0.92, 0.99), "measuring the gain", |axis| errors(axis, observed))?;
+    let [Some(before), Some(after)] = both.as_slice() else { return Ok(Vec::new()) };
+    Ok(gains(axis, before, after))
+}
+
+/// The gains on the fitted recording itself: every other block is predicted by a machine that was fitted without it.
+///
+/// # Errors
+/// [`Stopped`] when the watch's caller said so.
+pub fn on_held_out_blocks(
+    axis: &Axis,
+    columns: &Columns,
+    bench: &Bench,
+    fit: &Fit,
+    watch: &Watch,
+) -> Result<Vec<Gain>, Stopped> {
+    let Some(mut observed) = columns.observed() else { return Ok(Vec::new()) };
+    if columns.left_out > 0 {
+        // What the axis did in between is not at hand, so that no loop can be replayed.
+        observed.command = None;
+    }
+    let machines = [axis.clone(), fitted_without(axis, bench, fit, 0), fitted_without(axis, bench, fit, 1)];
+    let all = watch.each(&machines, (0.92, 0.99), "measuring the gain", |axis| errors(axis, &observed))?;
+    let [Some(before), Some(even), Some(odd)] = all.as_slice() else { return Ok(Vec::new()) };
+    let half = half_of_rows(bench, &observed.time_s);
+    let after: Errors = std::array::from_fn(|channel| {
+        let (even, odd) = (even[channel].as_ref()?, odd[channel].as_ref()?);
+        Some(half.iter().enumerate().map(|(i, half)| [even[i], odd[i], f64::NAN][*half]).collect())
+    });
+    Ok(gains(axis, before, &after))
+}
+
+/// The axis with effects whose coefficients are fitted without the blocks of one half (even or odd).
+fn fitted_without(axis: &Axis, bench: &Bench, fit: &Fit, half: usize) -> Axis {
+    let coefficients = bench.coefficients_without(fit, |block| block % 2 == half);
+    let effect = |(i, part): (usize, &super::fit::Part)| {
+        let of = |c: &[f64]| (part.law.effect)(bench.frame, &part.shape, c);
+        of(&coefficients[i]).or_else(|| of(&fit.coefficients[i])).map(|e| belief::together(axis, e))
+    };
+    let effects: Vec<Effect> = fit.parts.iter().enumerate().filter_map(effect).collect();
+    belief::extended(axis, &effects)
+}
+
+/// For each row the half its block belongs to, 2 for rows before the first and after the last block.
+fn half_of_rows(bench: &Bench, time_s: &[f64]) -> Vec<usize> {
+    let frame = bench.frame;
+    let begin =
+        |block: usize| frame.kept.get(frame.blocks[block]).map_or(f64::INFINITY, |&row| frame.columns.time_s[row]);
+    let last = frame.kept.last().map_or(0.0, |&row| frame.columns.time_s[row]);
+    let mut block = 0;
+    let of = |&t: &f64| {
+        while block + 2 < frame.blocks.len() && t >= begin(block + 1) {
+            block += 1;
+        }
+        if t < begin(0) || t > last { 2 } else { block % 2 }
+    };
+    time_s.iter().map(of).collect()
+}
+
+fn gains(axis: &Axis, before: &Errors, after: &Errors) -> Vec<Gain> {
+    let names = [axis.drive.torque_word(), "position", "table_position"];
+    let pairs = names.into_iter().zip(before.iter().zip(after));
+    pairs.filter_map(|(name, (before, after))| gain(name, before.as_ref()?, after.as_ref()?)).collect()
 }
 
 /// RMS before and after over rows where both are known, with the interval over contiguous blocks.

@@ -1,5 +1,6 @@
 //! A diagnosis as `diagnosis.json` (schema gib.diagnosis/1).
 
+use super::show::View;
 use super::verdict::{Diagnosis, Verdict};
 use serde_json::{Map, Value, json};
 
@@ -48,8 +49,8 @@ impl Diagnosis {
                 (g.channel.to_owned(), value)
             })
             .collect();
-        let shares = |list: &[(&'static str, f64)]| -> Map<String, Value> {
-            list.iter().map(|(name, share)| (name.replace(' ', "_"), json!(share))).collect()
+        let shares = |pick: fn(&View) -> f64| -> Map<String, Value> {
+            self.shown.iter().map(|view| (view.coordinate.name().replace(' ', "_"), json!(pick(view)))).collect()
         };
         let u = &self.unexplained;
         let word = self.extended.drive.torque_word();
@@ -57,10 +58,13 @@ impl Diagnosis {
         unexplained.insert(format!("{word}_rms"), json!(u.torque_rms));
         unexplained.insert(format!("{word}_noise_rms"), json!(u.noise_rms));
         unexplained.insert("describes".into(), json!(u.describes));
-        unexplained.insert("lives_in".into(), Value::Object(shares(&u.lives_in)));
-        unexplained.insert("before_naming".into(), Value::Object(shares(&self.shown)));
+        unexplained.insert("lives_in".into(), Value::Object(shares(|view| view.after)));
+        unexplained.insert("before_naming".into(), Value::Object(shares(|view| view.before)));
         if !self.missing.is_empty() {
             unexplained.insert("missing".into(), json!(self.missing));
+        }
+        if !self.notes.is_empty() {
+            unexplained.insert("notes".into(), json!(self.notes));
         }
         json!({ "schema": "gib.diagnosis/1", "verdict": self.verdict.name(), "axis": self.extended.name,
             "findings": findings, "gain": gain, "unexplained": unexplained })

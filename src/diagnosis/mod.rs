@@ -7,6 +7,7 @@
 //!
 //! T_measured(t + delay) = J·α + Tv·ω + Tc·sign(ω) + T0 + Σ causes, in the drive's own unit (N·m, or N for linear).
 
+mod belief;
 pub mod causes;
 mod columns;
 pub mod experiment;
@@ -15,9 +16,12 @@ pub mod fit;
 pub mod frame;
 pub mod gain;
 mod json;
+pub mod progress;
 pub mod select;
+pub mod show;
 pub mod uncertainty;
 pub mod verdict;
 
-pub use select::{Stopped, Watch};
-pub use verdict::{Diagnosis, Finding, Unexplained, Verdict, diagnose};
+pub use progress::{Progress, Stopped};
+pub use show::{Coordinate, View};
+pub use verdict::{Diagnosis, Finding, Unexplained, Verdict, diagnose, usable};

@@ -5,8 +5,9 @@
 //! when its gain is a fair share of what is left, and is borne out on held-out contiguous blocks: the coefficients are
 //! fitted without a block and judged on it.
 
-use super::causes::{LAWS, Law};
+use super::causes::Law;
 use super::fit::{Bench, Fit, Part, dot, figure};
+use super::progress::{Stopped, Watch};
 use crate::machine::Cause;
 use std::collections::HashMap;
 
@@ -22,13 +23,6 @@ pub const LEAST_GAIN: f64 = 0.08;
 /// What a further fitted number must gain where sets of causes compete.
 const NUMBER_PRICE: f64 = 0.003;
 
-/// Watches over long work: called with a share done; answers false to stop.
-pub type Watch<'w> = &'w (dyn Fn(f64) -> bool + Sync);
-
-/// The work was stopped by its caller.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stopped;
-
 /// The set of causes that explains the recording best, and the runners-up for its first cause.
 #[derive(Debug)]
 pub struct Selection {
@@ -41,32 +35,34 @@ pub struct Selection {
 /// Terms at the starts of the laws whose starts do not depend on the rest: they are made once.
 type Shelf = HashMap<Cause, Vec<Part>>;
 
-/// Selects causes on a bench.
+/// What stays the same while sets of causes grow.
+struct Search<'s, 'f, 'a> {
+    bench: &'s Bench<'f, 'a>,
+    laws: &'s [&'static Law],
+    shelf: Shelf,
+    watch: &'s Watch<'s>,
+}
+
+/// Selects causes among these laws on a bench.
 ///
 /// # Errors
-/// [`Stopped`] when the watch said so.
-pub fn select(bench: &Bench, watch: Watch) -> Result<Selection, Stopped> {
+/// [`Stopped`] when the watch's caller said so.
+pub fn select(bench: &Bench, laws: &[&'static Law], watch: &Watch) -> Result<Selection, Stopped> {
     let empty = bench.fit(Vec::new());
-    let shelf: Shelf = parallel(LAWS, |law| {
-        let parts = if law.starts_from_rest {
-            Vec::new()
-        } else {
-            bench.starts(law, &empty).into_iter().map(|shape| bench.part(law, shape)).collect()
-        };
+    let shelf = watch.each(laws, (0.05, 0.15), "laying out what each cause would do", |law| {
+        let parts = if law.starts_from_rest { Vec::new() } else { bench.parts(law, bench.starts(law, &empty)) };
         (law.cause, parts)
-    })
-    .into_iter()
-    .collect();
+    })?;
+    let search = Search { bench, laws, shelf: shelf.into_iter().collect(), watch };
     let mut beam = vec![empty];
     let mut best: Vec<Fit> = beam.clone();
     let mut rivals = Vec::new();
     for depth in 0..MOST {
-        if !watch(0.1 + 0.8 * depth as f64 / MOST as f64) {
-            return Err(Stopped);
-        }
+        // Most searches end after a cause or two, so that the first steps are most of the work.
+        let share = |steps: usize| 0.8 - 0.65 * 0.4f64.powi(steps as i32);
         let mut grown: Vec<Fit> = Vec::new();
         for set in &beam {
-            for child in grow(bench, set, &shelf) {
+            for child in grow(&search, set, (share(depth), share(depth + 1)))? {
                 if price(&child) < price(set) - 0.5 * LEAST_GAIN && !grown.iter().any(|f| same_causes(f, &child)) {
                     grown.push(child);
                 }
@@ -84,7 +80,7 @@ pub fn select(bench: &Bench, watch: Watch) -> Result<Selection, Stopped> {
         beam = grown;
     }
     let start = best.pop().unwrap_or_else(|| bench.fit(Vec::new()));
-    let fit = shrink(bench, start);
+    let fit = shrink(bench, start, watch)?;
     rivals.retain(|r| r.parts.len() == fit.parts.len() && !same_causes(r, &fit));
     Ok(Selection { fit, rivals })
 }
@@ -104,36 +100,38 @@ fn same_causes(a: &Fit, b: &Fit) -> bool {
 }
 
 /// The set with each of the most promising causes added, refined jointly.
-fn grow(bench: &Bench, set: &Fit, shelf: &Shelf) -> Vec<Fit> {
-    let open: Vec<&'static Law> = LAWS.iter().copied().filter(|law| may_join(set, law)).collect();
-    let mut promising: Vec<(f64, Part)> = parallel(&open, |law| {
-        let fresh: Vec<Part>;
-        let parts: &[Part] = if law.starts_from_rest {
-            fresh = bench.starts(law, set).into_iter().map(|shape| bench.part(law, shape)).collect();
-            &fresh
-        } else {
-            shelf.get(&law.cause).map_or(&[], Vec::as_slice)
-        };
-        let scored =
-            parts.iter().map(|part| (figure(&bench.joined(set, part)) + NUMBER_PRICE * part.shape.len() as f64, part));
-        scored.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(value, part)| (value, part.clone()))
-    })
-    .into_iter()
-    .flatten()
-    .collect();
+fn grow(search: &Search, set: &Fit, (from, to): (f64, f64)) -> Result<Vec<Fit>, Stopped> {
+    let Search { bench, laws, shelf, watch } = search;
+    let open: Vec<&'static Law> = laws.iter().copied().filter(|law| may_join(set, law)).collect();
+    let half = 0.5 * (from + to);
+    let mut promising: Vec<(f64, Part)> = watch
+        .each(&open, (from, half), "looking for causes", |law| {
+            let fresh: Vec<Part>;
+            let parts: &[Part] = if law.starts_from_rest {
+                fresh = bench.parts(law, bench.starts(law, set));
+                &fresh
+            } else {
+                shelf.get(&law.cause).map_or(&[], Vec::as_slice)
+            };
+            let scored = parts
+                .iter()
+                .map(|part| (figure(&bench.joined(set, part)) + NUMBER_PRICE * part.shape.len() as f64, part));
+            scored.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(value, part)| (value, part.clone()))
+        })?
+        .into_iter()
+        .flatten()
+        .collect();
     promising.sort_by(|a, b| a.0.total_cmp(&b.0));
     promising.truncate(TRIED);
-    parallel(&promising, |(_, part)| {
+    let grown = watch.each(&promising, (half, to), "fitting causes", |(_, part)| {
         let mut parts = set.parts.clone();
         parts.push(part.clone());
         let count = set.parts.len();
         let fit = bench.refine(bench.fit(parts), count, 6);
         let fit = bench.refine(fit, 0, if count == 0 { 4 } else { 2 });
         is_physical(bench, &fit).then_some(fit)
-    })
-    .into_iter()
-    .flatten()
-    .collect()
+    })?;
+    Ok(grown.into_iter().flatten().collect())
 }
 
 fn may_join(set: &Fit, law: &Law) -> bool {
@@ -147,18 +145,15 @@ fn is_physical(bench: &Bench, fit: &Fit) -> bool {
 }
 
 /// Drops causes that the others can do without, and those that held-out blocks do not bear out.
-fn shrink(bench: &Bench, mut fit: Fit) -> Fit {
+fn shrink(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
     fit = bench.refine(fit, 0, 8);
     while !fit.parts.is_empty() {
-        let without: Vec<Fit> = parallel(&(0..fit.parts.len()).collect::<Vec<_>>(), |&i| {
+        let each: Vec<usize> = (0..fit.parts.len()).collect();
+        let without = watch.each(&each, (0.8, 0.9), "leaving out what is not needed", |&i| {
             let mut parts = fit.parts.clone();
             parts.remove(i);
-            let least = bench.refine(bench.fit(parts), 0, 4);
-            (is_physical(bench, &least), least)
-        })
-        .into_iter()
-        .map(|(_, least)| least)
-        .collect();
+            bench.refine(bench.fit(parts), 0, 4)
+        })?;
         let weakest = without.into_iter().min_by(|a, b| price(a).total_cmp(&price(b)));
         let Some(weakest) = weakest else { break };
         if price(&weakest) - price(&fit) >= LEAST_GAIN && borne_out(bench, &weakest, &fit) {
@@ -166,7 +161,7 @@ fn shrink(bench: &Bench, mut fit: Fit) -> Fit {
         }
         fit = weakest;
     }
-    fit
+    Ok(fit)
 }
 
 /// Whether held-out blocks bear out what `full` gains over `less`.
@@ -186,12 +181,7 @@ pub(super) fn held_out(bench: &Bench, fit: &Fit) -> Vec<f64> {
     let count = frame.blocks.len() - 1;
     (0..count)
         .map(|block| {
-            let range = frame.blocks[block]..frame.blocks[block + 1];
-            let pieces: Vec<std::ops::Range<usize>> = if fit.residual.len() > bench.rows {
-                vec![range.clone(), range.start + bench.rows..range.end + bench.rows]
-            } else {
-                vec![range]
-            };
+            let pieces = bench.pieces(frame.blocks[block]..frame.blocks[block + 1]);
             // With orthonormal columns U, the held-out residual is (1 − U_b·U_bᵀ)⁻¹·r_b: solved in the small space,
             // r_b + U_b·(1 − U_bᵀ·U_b)⁻¹·U_bᵀ·r_b.
             let k = basis.len();
@@ -218,29 +208,4 @@ pub(super) fn held_out(bench: &Bench, fit: &Fit) -> Vec<f64> {
             sum
         })
         .collect()
-}
-
-/// Runs a function over items on two threads, answers in order.
-fn parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let next = std::sync::atomic::AtomicUsize::new(0);
-    let done = std::sync::Mutex::new(Vec::with_capacity(items.len()));
-    let threads = std::thread::available_parallelism().map_or(1, |n| n.get().min(8));
-    std::thread::scope(|scope| {
-        for _ in 0..threads.min(items.len()) {
-            scope.spawn(|| {
-                while let Some((i, item)) = {
-                    let i = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-                    items.get(i).map(|item| (i, item))
-                } {
-                    let answer = work(item);
-                    if let Ok(mut list) = done.lock() {
-                        list.push((i, answer));
-                    }
-                }
-            });
-        }
-    });
-    let mut list = done.into_inner().unwrap_or_default();
-    list.sort_by_key(|entry| entry.0);
-    list.into_iter().map(|entry| entry.1).collect()
 }

@@ -1,6 +1,11 @@
-//! How sure the parameters are: a sandwich over contiguous blocks, which lets residuals be autocorrelated within a block
-//! and as large in one place as they like (Liang and Zeger 1986), then the delta method from coefficients and non-linear
-//! parameters to the parameters of the file.
+//! How sure the parameters are: a jackknife over contiguous blocks, which lets residuals be autocorrelated within a block
+//! and as large in one place as they like, then the delta method from coefficients and non-linear parameters to those of
+//! the file.
+//!
+//! Leaving block b out moves the estimate by δ_b = (N − M_b)⁻¹·X_bᵀ·r_b with N = XᵀX, M_b = X_bᵀ·X_b; the covariance is
+//! (B − 1)/B·Σ δ_b·δ_bᵀ (Bell and McCaffrey 2002). What a few blocks tell is less sure than it seems: the deviation that is
+//! stated is that of a normal distribution whose 95 % are as wide as those of Student's with as many degrees of freedom as
+//! blocks effectively take part (Imbens and Kolesár 2016).
 
 use super::fit::{Bench, Fit, dot};
 use crate::machine::Effect;
@@ -20,7 +25,7 @@ pub fn effects(bench: &Bench, fit: &Fit) -> Vec<Option<(Effect, Vec<f64>)>> {
     }
     let first_slope = columns.len();
     columns.extend(slopes.iter().map(|s| s.column.as_slice()));
-    let covariance = sandwich(bench, fit, &columns);
+    let spread = Spread::of(bench, fit, &columns);
     fit.parts
         .iter()
         .enumerate()
@@ -53,53 +58,84 @@ pub fn effects(bench: &Bench, fit: &Fit) -> Vec<Option<(Effect, Vec<f64>)>> {
                 let rate = scale.rate(part.shape[slope.index]);
                 differ(first_slope + s, step / rate, effect_of(&shape, &fit.coefficients[i]));
             }
-            let of_values = &gradient * &covariance * gradient.transpose();
-            let deviations = (0..values.len()).map(|k| of_values[(k, k)].max(0.0).sqrt()).collect();
+            let deviations = (0..values.len()).map(|k| spread.deviation(&gradient.row(k).transpose())).collect();
             Some((effect, deviations))
         })
         .collect()
 }
 
-/// Covariance of all unknowns: (XᵀX)⁻¹·(Σ_b s_b·s_bᵀ)·(XᵀX)⁻¹ with s_b = X_bᵀ·r_b, widened for the number of blocks.
-fn sandwich(bench: &Bench, fit: &Fit, columns: &[&[f64]]) -> DMatrix<f64> {
-    let k = columns.len();
-    if k == 0 {
-        return DMatrix::zeros(0, 0);
+/// What the blocks say about all unknowns.
+struct Spread {
+    /// By how much each block moves the unknowns when it is left out.
+    moves: Vec<DVector<f64>>,
+    /// N⁻¹·M_b·N⁻¹: the share of each block in what is known.
+    shares: Vec<DMatrix<f64>>,
+}
+
+impl Spread {
+    fn of(bench: &Bench, fit: &Fit, columns: &[&[f64]]) -> Spread {
+        let k = columns.len();
+        if k == 0 {
+            return Spread { moves: Vec::new(), shares: Vec::new() };
+        }
+        // What every fit leaves free is taken off the columns first.
+        let free = fit.basis().len() - fit.coefficients.iter().map(Vec::len).sum::<usize>();
+        let cleared: Vec<Vec<f64>> = columns
+            .iter()
+            .map(|column| {
+                let mut c = column.to_vec();
+                for direction in fit.basis().iter().take(free) {
+                    let along = dot(direction, &c);
+                    c.iter_mut().zip(direction).for_each(|(c, d)| *c -= along * d);
+                }
+                c
+            })
+            .collect();
+        let scales: Vec<f64> = cleared.iter().map(|c| dot(c, c).sqrt().max(1e-300)).collect();
+        let normal = DMatrix::from_fn(k, k, |i, j| dot(&cleared[i], &cleared[j]) / (scales[i] * scales[j]));
+        let pseudo = |m: &DMatrix<f64>| m.clone().pseudo_inverse(1e-10).unwrap_or_else(|_| DMatrix::identity(k, k));
+        let inverse = pseudo(&normal);
+        let (mut moves, mut shares) = (Vec::new(), Vec::new());
+        for block in bench.frame.blocks.windows(2) {
+            let pieces = bench.pieces(block[0]..block[1]);
+            let over = |a: &[f64], b: &[f64]| pieces.iter().map(|p| dot(&a[p.clone()], &b[p.clone()])).sum::<f64>();
+            let own = DMatrix::from_fn(k, k, |i, j| over(&cleared[i], &cleared[j]) / (scales[i] * scales[j]));
+            let score = DVector::from_fn(k, |i, _| over(&cleared[i], &fit.residual) / scales[i]);
+            // A block that alone knows of something cannot be left out; a twentieth of it stays.
+            let moved = pseudo(&(&normal - &own * 0.95)) * score;
+            moves.push(DVector::from_fn(k, |i, _| moved[i] / scales[i]));
+            let share = &inverse * own * &inverse;
+            shares.push(DMatrix::from_fn(k, k, |i, j| share[(i, j)] / (scales[i] * scales[j])));
+        }
+        Spread { moves, shares }
     }
-    // What every fit leaves free is taken off the columns first.
-    let free = fit.basis().len() - fit.coefficients.iter().map(Vec::len).sum::<usize>();
-    let cleared: Vec<Vec<f64>> = columns
-        .iter()
-        .map(|column| {
-            let mut c = column.to_vec();
-            for direction in fit.basis().iter().take(free) {
-                let along = dot(direction, &c);
-                c.iter_mut().zip(direction).for_each(|(c, d)| *c -= along * d);
-            }
-            c
-        })
-        .collect();
-    let scales: Vec<f64> = cleared.iter().map(|c| dot(c, c).sqrt().max(1e-300)).collect();
-    let normal = DMatrix::from_fn(k, k, |i, j| dot(&cleared[i], &cleared[j]) / (scales[i] * scales[j]));
-    let inverse = normal.pseudo_inverse(1e-10).unwrap_or_else(|_| DMatrix::identity(k, k));
-    let blocks = &bench.frame.blocks;
-    let count = blocks.len() - 1;
-    let mut meat = DMatrix::<f64>::zeros(k, k);
-    for b in 0..count {
-        let range = blocks[b]..blocks[b + 1];
-        let with_table = fit.residual.len() > bench.rows;
-        let score = DVector::from_fn(k, |i, _| {
-            let mut sum = dot(&cleared[i][range.clone()], &fit.residual[range.clone()]);
-            if with_table {
-                let range = range.start + bench.rows..range.end + bench.rows;
-                sum += dot(&cleared[i][range.clone()], &fit.residual[range]);
-            }
-            sum / scales[i]
-        });
-        meat += &score * score.transpose();
+
+    /// Deviation of the parameter with this gradient by the unknowns.
+    fn deviation(&self, gradient: &DVector<f64>) -> f64 {
+        let blocks = self.moves.len() as f64;
+        let variance: f64 = self.moves.iter().map(|m| gradient.dot(m).powi(2)).sum::<f64>() * (blocks - 1.0) / blocks;
+        let shares: Vec<f64> = self.shares.iter().map(|s| gradient.dot(&(s * gradient)).max(0.0)).collect();
+        let (sum, squares) = shares.iter().fold((0.0, 0.0), |(sum, squares), s| (sum + s, squares + s * s));
+        let taking_part = if squares > 0.0 { sum * sum / squares } else { 1.0 };
+        variance.max(0.0).sqrt() * widening(taking_part)
     }
-    // Few blocks: the usual widening, and Student's 1.05 at twenty-odd degrees of freedom.
-    let blocks_over = count as f64 / (count as f64 - k as f64).max(1.0);
-    let covariance = &inverse * meat * &inverse * (blocks_over * 1.1);
-    DMatrix::from_fn(k, k, |i, j| covariance[(i, j)] / (scales[i] * scales[j]))
+}
+
+/// Half-width of Student's central 95 % over that of the normal distribution, by Fisher's expansion; fewer than two degrees
+/// of freedom count as two.
+fn widening(freedom: f64) -> f64 {
+    let v = freedom.max(2.0);
+    1.0 + (2.372 + (2.823 + 2.555 / v) / v) / v / 1.96
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn student_s_quantiles() {
+        for (freedom, quantile) in [(4.0, 2.776), (10.0, 2.228), (23.0, 2.069)] {
+            assert!((1.96 * widening(freedom) / quantile - 1.0).abs() < 0.01, "{freedom}");
+        }
+    }
 }

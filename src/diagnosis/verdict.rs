@@ -4,15 +4,18 @@
 //! is the excess. Causes are named only when together they remove most of the excess; a set of causes that leaves much of
 //! it is an imitation of something that is not in the vocabulary, and is not named.
 
-use super::causes::{Law, law};
+use super::belief;
+use super::causes::{LAWS, Law, law};
 use super::experiment;
 use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
-use super::gain::{Gain, gains};
-use super::select::{Selection, Stopped, Watch, select};
+use super::gain::{self, Gain};
+use super::progress::{Progress, Stopped, Watch};
+use super::select::{Selection, select};
+use super::show::{self, View};
 use super::uncertainty;
 use crate::machine::{Axis, Cause, Effect};
-use crate::recording::Recording;
+use crate::recording::{Recording, RecordingError};
 
 /// Judged time below which nothing is said, s, and judged rows.
 const LEAST_SECONDS: f64 = 1.0;
@@ -69,8 +72,6 @@ pub struct Unexplained {
     pub noise_rms: f64,
     /// Where it lives, in words.
     pub describes: String,
-    /// Share of the residual's variance that each coordinate explains.
-    pub lives_in: Vec<(&'static str, f64)>,
 }
 
 /// The whole answer.
@@ -84,10 +85,12 @@ pub struct Diagnosis {
     pub gains: Vec<Gain>,
     /// What is left.
     pub unexplained: Unexplained,
-    /// The residual of the belief by coordinate, before any naming.
-    pub shown: Vec<(&'static str, f64)>,
+    /// The residual against everything it may go with, before and after.
+    pub shown: Vec<View>,
     /// What is missing, where the data do not suffice.
     pub missing: Vec<String>,
+    /// What a reader must know about how the answer was come by.
+    pub notes: Vec<String>,
     /// The axis with its effects.
     pub extended: Axis,
 }
@@ -95,60 +98,89 @@ pub struct Diagnosis {
 /// Diagnoses an axis on a recording; with a hold-out, the gain is measured there.
 ///
 /// # Errors
-/// [`Stopped`] when `watch` answers false.
+/// [`Stopped`] when `progress` answers false.
 pub fn diagnose(
     axis: &Axis,
     recording: &Recording,
     holdout: Option<&Recording>,
-    watch: Watch,
+    progress: Progress,
 ) -> Result<Diagnosis, Stopped> {
-    let columns = match Columns::of(recording, axis) {
+    let watch = Watch::new(progress);
+    watch.at(0.0, "reading the motion")?;
+    let whole = match Columns::of(recording, axis) {
         Ok(columns) => columns,
         Err(why) => return Ok(insufficient(axis, vec![why.to_string()])),
     };
-    let frame = Frame::new(axis, &columns, None);
+    let mut notes = whole.note();
+    let mut columns = whole.clone();
+    if let Err(why) = belief::take_off(axis, &mut columns) {
+        return Ok(insufficient(axis, vec![format!("a machine file that holds together: {why}")]));
+    }
+    let columns = columns.thinned();
+    let base = belief::base_alone(axis);
+    let frame = Frame::new(&base, &columns, None);
     let missing = what_is_missing(&frame);
     if !missing.is_empty() {
         return Ok(insufficient(axis, missing));
     }
-    if !watch(0.05) {
-        return Err(Stopped);
-    }
+    watch.at(0.05, "reading the motion")?;
     let bench = Bench::new(&frame, &frame.believed());
     let empty = bench.fit(Vec::new());
-    let selection = select(&bench, watch)?;
-    let before = Excess::of(&bench, &empty, &selection.fit);
-    let after = Excess::of(&bench, &selection.fit, &selection.fit);
-    let explained = before.explained_by(&after);
-    let lost_motion = selection.fit.parts.iter().any(|p| p.law.cause == Cause::Backlash);
-    let least = if lost_motion { LEAST_EXPLAINED_LOST_MOTION } else { LEAST_EXPLAINED };
-    let (verdict, fit) = if selection.fit.parts.is_empty() {
-        (if before.largest() > TOLERABLE_EXCESS { Verdict::UnknownCause } else { Verdict::NoDiscrepancy }, &empty)
-    } else if before.largest() > TOLERABLE_EXCESS && explained < least {
-        (Verdict::UnknownCause, &empty)
-    } else if after.largest() > LITTLE_LEFT {
-        (Verdict::PartlyExplained, &selection.fit)
-    } else {
-        (Verdict::Explained, &selection.fit)
+    let laws: Vec<&'static Law> = LAWS.iter().copied().filter(|law| belief::may_be_found(axis, law.cause)).collect();
+    let selection = select(&bench, &laws, &watch)?;
+    let (verdict, fit) = judge(&bench, &empty, &selection);
+    let findings = findings(axis, &bench, fit, &selection, &empty);
+    let effects: Vec<Effect> = findings.iter().map(|f| f.effect).collect();
+    let extended = belief::extended(axis, &effects);
+    watch.at(0.92, "measuring the gain")?;
+    let gains = match holdout.map(|h| Columns::of(h, axis).map(|columns| (columns.note(), columns.observed()))) {
+        Some(Ok((note, Some(observed)))) => {
+            notes.extend(note);
+            gain::on_holdout(axis, &extended, &observed, &watch)?
+        }
+        None => gain::on_held_out_blocks(axis, &whole, &bench, fit, &watch)?,
+        Some(why) => {
+            let why = why.err().map_or_else(|| "no stretch of it is whole".to_owned(), |e| e.to_string());
+            notes.push(format!("the hold-out cannot be used ({why}); the gain is measured on held-out blocks instead"));
+            gain::on_held_out_blocks(axis, &whole, &bench, fit, &watch)?
+        }
     };
-    let findings = findings(&bench, fit, &selection, &empty);
-    let mut effects = axis.effects.clone();
-    effects.extend(findings.iter().map(|f| f.effect));
-    let extended = axis.with_effects(effects);
-    if !watch(0.95) {
-        return Err(Stopped);
-    }
-    let gains = gains(axis, &extended, holdout, &bench, &empty, fit);
-    let shown = experiment::lives_in(&bench, &empty);
-    let lives_in = experiment::lives_in(&bench, fit);
+    let shown = show::views(&bench, &empty, fit);
     let [rest, _] = bench.rest(fit);
     let unexplained = Unexplained {
         torque_rms: rms(&rest),
         noise_rms: frame.floor(&rest, true),
-        describes: experiment::describe(&lives_in, Excess::of(&bench, fit, fit).largest()),
-        lives_in,
+        describes: show::describe(&shown, Excess::of(&bench, fit, fit).largest()),
     };
-    Ok(Diagnosis { verdict, findings, gains, unexplained, shown, missing: Vec::new(), extended })
+    watch.at(1.0, "done")?;
+    Ok(Diagnosis { verdict, findings, gains, unexplained, shown, missing: Vec::new(), notes, extended })
+}
+
+/// What may be said, and the fit that says it.
+fn judge<'f>(bench: &Bench, empty: &'f Fit, selection: &'f Selection) -> (Verdict, &'f Fit) {
+    let before = Excess::of(bench, empty, &selection.fit);
+    let after = Excess::of(bench, &selection.fit, &selection.fit);
+    let explained = before.explained_by(&after);
+    let lost_motion = selection.fit.parts.iter().any(|p| p.law.cause == Cause::Backlash);
+    let least = if lost_motion { LEAST_EXPLAINED_LOST_MOTION } else { LEAST_EXPLAINED };
+    if selection.fit.parts.is_empty() {
+        let verdict = if before.largest() > TOLERABLE_EXCESS { Verdict::UnknownCause } else { Verdict::NoDiscrepancy };
+        (verdict, empty)
+    } else if before.largest() > TOLERABLE_EXCESS && explained < least {
+        (Verdict::UnknownCause, empty)
+    } else if after.largest() > LITTLE_LEFT {
+        (Verdict::PartlyExplained, &selection.fit)
+    } else {
+        (Verdict::Explained, &selection.fit)
+    }
+}
+
+/// Whether a recording has the columns that a diagnosis of this axis needs.
+///
+/// # Errors
+/// Position or torque (force) is missing or in a wrong unit.
+pub fn usable(recording: &Recording, axis: &Axis) -> Result<(), RecordingError> {
+    Columns::of(recording, axis).map(|_| ())
 }
 
 fn insufficient(axis: &Axis, missing: Vec<String>) -> Diagnosis {
@@ -156,14 +188,10 @@ fn insufficient(axis: &Axis, missing: Vec<String>) -> Diagnosis {
         verdict: Verdict::InsufficientData,
         findings: Vec::new(),
         gains: Vec::new(),
-        unexplained: Unexplained {
-            torque_rms: 0.0,
-            noise_rms: 0.0,
-            describes: "not judged".into(),
-            lives_in: Vec::new(),
-        },
+        unexplained: Unexplained { torque_rms: 0.0, noise_rms: 0.0, describes: "not judged".into() },
         shown: Vec::new(),
         missing,
+        notes: Vec::new(),
         extended: axis.clone(),
     }
 }
@@ -217,7 +245,7 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
-fn findings(bench: &Bench, fit: &Fit, selection: &Selection, empty: &Fit) -> Vec<Finding> {
+fn findings(axis: &Axis, bench: &Bench, fit: &Fit, selection: &Selection, empty: &Fit) -> Vec<Finding> {
     let effects = uncertainty::effects(bench, fit);
     let total = 1.0 - (fit.squares() / empty.squares()).min(1.0);
     let drops: Vec<f64> = (0..fit.parts.len())
@@ -234,12 +262,12 @@ fn findings(bench: &Bench, fit: &Fit, selection: &Selection, empty: &Fit) -> Vec
         let law: &Law = law(effect.cause());
         let ties = ties(bench, fit, selection, i);
         list.push(Finding {
-            evidence: (law.sentence)(&effect, bench.frame.axis),
+            evidence: (law.sentence)(&belief::together(axis, effect), bench.frame.axis),
             confidence: confidence(bench, fit, i),
             share: (drops[i] / sum * total).clamp(0.0, 1.0),
             next_experiment: ties.first().map(|other| experiment::telling(bench.frame, effect.cause(), *other)),
             indistinguishable_from: ties,
-            effect,
+            effect: belief::together(axis, effect),
             deviations,
         });
     }

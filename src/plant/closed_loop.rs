@@ -5,7 +5,7 @@
 use super::motion::cubic_at;
 use super::noise::Noise;
 use super::observed::Observed;
-use super::predict::TorquePrediction;
+use super::predict::{TorquePrediction, predict_torque};
 use super::simulate::{Setup, Start, simulate_physics};
 use crate::machine::Axis;
 
@@ -14,10 +14,32 @@ use crate::machine::Axis;
 pub struct ClosedLoop {
     /// Motor encoder.
     pub position: Vec<f64>,
-    /// Table, before any error of the screw whose phase is not known.
+    /// Table, with the errors of the screw.
     pub table_position: Vec<f64>,
     /// Drive's own unit.
     pub torque: Vec<f64>,
+}
+
+/// Everything that a machine file says about a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prediction {
+    /// Torque from the measured motion; at rest that of the closed loop, where there is one.
+    pub torque: TorquePrediction,
+    /// The closed loop; `None` without a servo or a recorded command.
+    pub closed_loop: Option<ClosedLoop>,
+}
+
+/// Predicts a recording: what `gib predict` writes and what the gain of a diagnosis is measured by.
+///
+/// # Errors
+/// As [`predict_torque`] and [`replay`].
+pub fn predict(axis: &Axis, observed: &Observed) -> Result<Prediction, String> {
+    let mut torque = predict_torque(axis, observed)?;
+    let closed_loop = replay(axis, observed, &torque)?;
+    if let Some(replayed) = &closed_loop {
+        fill_rest(&mut torque, observed, replayed);
+    }
+    Ok(Prediction { torque, closed_loop })
 }
 
 /// Simulates the recorded command under the axis's servo; `prediction` gives the numbers and the phases of its ripples.
@@ -66,7 +88,7 @@ pub fn replay(axis: &Axis, observed: &Observed, prediction: &TorquePrediction) -
 ///
 /// What dry friction holds at rest is not in the motion: it is what the servo has come to by then, which the replay
 /// knows. At rest means less travel within a period of the motion's cut-off than reversing friction takes.
-pub fn fill_rest(prediction: &mut TorquePrediction, observed: &Observed, replayed: &ClosedLoop) {
+fn fill_rest(prediction: &mut TorquePrediction, observed: &Observed, replayed: &ClosedLoop) {
     let motion = &observed.motion;
     let slow = 10.0 * motion.resolution * motion.cutoff_hz;
     let around = (0.5 / (motion.cutoff_hz * observed.period_s)).ceil() as usize;

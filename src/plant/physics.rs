@@ -57,6 +57,8 @@ pub struct Physics {
     pub table_error: Vec<Ripple>,
     /// Table against encoder: share of the travel.
     pub table_scale: f64,
+    /// Where the table's scale stands when the encoder says zero, load units: the two are homed apart.
+    pub table_zero: f64,
     coulomb: f64,
     viscous: f64,
     asymmetry: f64,
@@ -86,6 +88,7 @@ impl Physics {
             vibration: Vec::new(),
             table_error: Vec::new(),
             table_scale: 0.0,
+            table_zero: 0.0,
             coulomb: belief.coulomb,
             viscous: belief.viscous,
             asymmetry: 0.0,
@@ -211,10 +214,12 @@ impl Physics {
         self.cogging.iter().map(|ripple| ripple.at(x)).sum()
     }
 
-    /// Table position at an ideal one (load units): pitch and periodic error of the screw.
+    /// Table position at an ideal one (load units): zero, pitch and periodic error of the screw.
     #[must_use]
     pub fn table_of(&self, x: f64) -> f64 {
-        x * (1.0 + self.table_scale) + 1e-3 * self.table_error.iter().map(|ripple| ripple.at(x)).sum::<f64>()
+        x * (1.0 + self.table_scale)
+            + self.table_zero
+            + 1e-3 * self.table_error.iter().map(|ripple| ripple.at(x)).sum::<f64>()
     }
 
     /// What the motor delivers when its current says `torque`.

@@ -6,16 +6,16 @@
 //! that the position can tell. Where clearance or spring stand between motor and table, the table's motion is that of its
 //! scale; without a scale the table is simulated behind the measured motor.
 //!
-//! Sampling: a servo that holds its command for a cycle and a motor that follows with time constant τ log, at the end of
-//! each cycle, a torque that is later than the smooth torque of the motion by Ts/(1 − e^(−Ts/τ)) − Ts/2 − τ. Without a
-//! lag the torque jumps at that very instant and the middle of the jump is what the motion shows: no shift.
+//! Sampling: a row holds the torque at the end of a cycle, before the servo answers to that row. The servo held its command
+//! for that cycle and the motor followed with time constant τ, so the row is later than the smooth torque of the motion:
+//! see [`sampling_shift_s`].
 
 use super::coupling::{longest_step_s, transmitted};
 use super::friction::Friction;
 use super::motion::{Motion, cubic_at, smoothed};
 use super::observed::Observed;
 use super::physics::{Physics, Ripple};
-use crate::machine::{Axis, Servo, TwoMasses};
+use crate::machine::{Axis, TwoMasses};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
@@ -26,6 +26,8 @@ pub struct TorquePrediction {
     pub torque: Vec<f64>,
     /// The axis's numbers, with the phases that were estimated.
     pub physics: Physics,
+    /// Table − motor by clearance and spring, load units, one value a row, where the table is simulated behind the motor.
+    pub table_lag: Option<Vec<f64>>,
     /// Ripples whose phase could not be had from the first quarter: they are left out of the prediction.
     pub phases_unknown: usize,
 }
@@ -37,17 +39,19 @@ pub struct TorquePrediction {
 pub fn predict_torque(axis: &Axis, observed: &Observed) -> Result<TorquePrediction, String> {
     let mut physics = Physics::of(axis)?;
     let ripples = (std::mem::take(&mut physics.cogging), std::mem::take(&mut physics.vibration));
-    let delay_s = physics.delay_s + axis.servo.as_ref().map_or(0.0, sampling_shift_s);
-    let shift = delay_s / observed.period_s;
+    let shift = (physics.delay_s + sampling_shift_s(axis, observed.period_s)) / observed.period_s;
 
-    let mut delivered = vec![f64::NAN; observed.time_s.len()];
+    let nothing = || vec![f64::NAN; observed.time_s.len()];
+    let mut delivered = nothing();
+    let mut table_lag = physics.two_masses.map(|_| nothing());
     for run in &observed.runs {
-        needed_torque(&physics, observed, run.clone(), &mut delivered);
+        needed_torque(&physics, observed, run.clone(), &mut delivered, table_lag.as_deref_mut());
     }
     (physics.cogging, physics.vibration) = ripples;
     let phases_unknown = set_phases(&mut physics, observed, &delivered, shift);
+    set_table_phases(&mut physics, observed);
 
-    let mut torque = vec![f64::NAN; delivered.len()];
+    let mut torque = nothing();
     for run in &observed.runs {
         for i in run.clone() {
             let (x, t) = (observed.motion.position[i], observed.time_s[i] - observed.time_s[0]);
@@ -60,26 +64,53 @@ pub fn predict_torque(axis: &Axis, observed: &Observed) -> Result<TorquePredicti
             torque[run.start + i] = if shift == 0.0 { part[i] } else { cubic_at(part, i as f64 - shift) };
         }
     }
-    Ok(TorquePrediction { torque, physics, phases_unknown })
+    Ok(TorquePrediction { torque, physics, table_lag, phases_unknown })
 }
 
-/// How much later than the motion's torque the logged one is, by sampling alone.
+/// How much later than the torque of the motion the logged one is by sampling alone, s.
+///
+/// When the servo's output steps at a row, the rows show 1 − e^(−k·Ts/τ) from there on, a step that is centred
+/// Ts/(1 − e^(−Ts/τ)) − Ts/2 later; the torque itself is centred τ later, and that is what the motion shows. The
+/// difference is half a cycle without a lag, and goes to nothing where the motor is slow. It holds for rows that are
+/// cycles, or every so many cycles; faster rows, or rows of another clock, meet the torque at all phases of the cycle and
+/// are late by nothing.
 #[must_use]
-pub fn sampling_shift_s(servo: &Servo) -> f64 {
+pub fn sampling_shift_s(axis: &Axis, row_period_s: f64) -> f64 {
+    let Some(servo) = &axis.servo else { return 0.0 };
     let (period, lag) = (servo.period_s, servo.torque_time_constant_s);
-    if lag == 0.0 { 0.0 } else { period / (1.0 - (-period / lag).exp()) - 0.5 * period - lag }
+    let cycles = row_period_s / period;
+    if cycles < 0.99 || (cycles - cycles.round()).abs() > 0.01 {
+        return 0.0;
+    }
+    let seen = if lag > 0.0 { period / (1.0 - (-period / lag).exp()) } else { period };
+    seen - 0.5 * period - lag
 }
 
 /// Torque that the motor must deliver, without ripples, for one run of rows.
-fn needed_torque(physics: &Physics, observed: &Observed, run: Range<usize>, torque: &mut [f64]) {
+fn needed_torque(
+    physics: &Physics,
+    observed: &Observed,
+    run: Range<usize>,
+    torque: &mut [f64],
+    table_lag: Option<&mut [f64]>,
+) {
     let scale = physics.motor_per_load;
     let (motion, time) = (&observed.motion, &observed.time_s);
     // Ten times what the position leaves open on the average: it leaves more open at a reversal. Never nothing.
     let smallest = (10.0 * motion.resolution * scale).max(1e-9 * scale);
     let travel = physics.presliding.unwrap_or(0.0).max(smallest);
     let transmitted = physics.two_masses.map(|masses| {
-        measured_table_torque(physics, &masses, observed, run.clone())
-            .unwrap_or_else(|| table_torque(physics, &masses, observed, run.clone()))
+        let simulated = |lag: Option<&mut [f64]>| table_torque(physics, &masses, observed, run.clone(), lag);
+        let measured = measured_table_torque(physics, &masses, observed, run.clone());
+        let lag = table_lag.map(|lag| &mut lag[run.clone()]);
+        match (measured, lag) {
+            (Some(measured), Some(lag)) => {
+                simulated(Some(lag));
+                measured
+            }
+            (None, lag) => simulated(lag),
+            (Some(measured), None) => measured,
+        }
     });
     let (inertia, share) = match &physics.two_masses {
         Some(masses) => (masses.motor_inertia, 1.0 - masses.table_friction_share),
@@ -135,7 +166,13 @@ fn measured_table_torque(
 }
 
 /// Torque that the table takes from a motor that moves as measured: the table is simulated behind its spring or clearance.
-fn table_torque(physics: &Physics, masses: &TwoMasses, observed: &Observed, run: Range<usize>) -> Vec<f64> {
+fn table_torque(
+    physics: &Physics,
+    masses: &TwoMasses,
+    observed: &Observed,
+    run: Range<usize>,
+    mut lag: Option<&mut [f64]>,
+) -> Vec<f64> {
     let scale = physics.motor_per_load;
     let motion = &observed.motion;
     let share = masses.table_friction_share;
@@ -147,6 +184,9 @@ fn table_torque(physics: &Physics, masses: &TwoMasses, observed: &Observed, run:
     // Mean of the torque between each row and the next.
     let mut means = Vec::with_capacity(run.len());
     for i in run.start..run.end - 1 {
+        if let Some(slot) = lag.as_deref_mut().and_then(|lag| lag.get_mut(i - run.start)) {
+            *slot = q / scale - motion.position[i];
+        }
         let span = observed.time_s[i + 1] - observed.time_s[i];
         let steps = (span / longest_step_s(masses, masses.table_inertia)).ceil().clamp(1.0, 1000.0);
         let h = span / steps;
@@ -233,6 +273,28 @@ fn set_phases(physics: &mut Physics, observed: &Observed, delivered: &[f64], shi
         }
     }
     silenced
+}
+
+/// Estimates the phases of the screw's periodic errors, and where the scale stands at the encoder's zero, from the first
+/// quarter of the rows; without a scale nothing is known of either.
+fn set_table_phases(physics: &mut Physics, observed: &Observed) {
+    let Some(table) = &observed.table_position else { return };
+    let quarter = table.len() / 4;
+    let rows: Vec<usize> = (0..quarter).filter(|&i| (table[i] - observed.motion.position[i]).is_finite()).collect();
+    let x = |i: usize| observed.motion.position[i];
+    // Lost motion turns with the direction; it must not turn the phase.
+    let (way, level) = (|i: usize| observed.motion.velocity[i].signum(), |_: usize| 1.0);
+    let column = |value: &dyn Fn(usize) -> f64| rows.iter().map(|&i| value(i)).collect::<Vec<f64>>();
+    let error: Vec<f64> = rows.iter().map(|&i| table[i] - x(i) * (1.0 + physics.table_scale)).collect();
+    let mut basis = vec![column(&level), column(&way)];
+    for ripple in &physics.table_error {
+        basis.extend([column(&|i| (ripple.wave * x(i)).sin()), column(&|i| (ripple.wave * x(i)).cos())]);
+    }
+    let Some(weights) = least_squares(&basis, &error) else { return };
+    physics.table_zero = weights[0];
+    for (ripple, pair) in physics.table_error.iter_mut().zip(weights[2..].chunks_exact(2)) {
+        ripple.phase = pair[1].atan2(pair[0]);
+    }
 }
 
 fn rms(values: impl Iterator<Item = f64>) -> f64 {

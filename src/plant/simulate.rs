@@ -2,7 +2,7 @@
 //!
 //! Each servo cycle: encoder and scale are read and the row is logged with the motor's torque of that instant, the servo
 //! computes its torque, and the body runs on under it to the next cycle. Where the motor has no lag its torque jumps at
-//! that instant, and the row holds the middle of the jump.
+//! that instant, and the row holds what it was before: the servo answers to the row.
 
 use super::axis::Body;
 use super::coupling::longest_step_s;
@@ -228,10 +228,11 @@ impl TorqueLog {
         };
         let since = place.fract() * period;
         let lag = self.servo.torque_time_constant_s;
-        match (lag > 0.0, since > 0.0) {
-            (true, _) => asked + (begin - asked) * (-since / lag).exp(),
-            (false, true) => asked,
-            (false, false) => 0.5 * (begin + asked),
-        }
+        let left = match (lag > 0.0, since > 0.0) {
+            (true, _) => (-since / lag).exp(),
+            (false, true) => 0.0,
+            (false, false) => 1.0,
+        };
+        asked + (begin - asked) * left
     }
 }

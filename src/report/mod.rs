@@ -2,4 +2,5 @@
 
 pub mod lost_motion;
 pub mod plot;
+pub mod residual;
 pub mod speed_variation;

@@ -18,10 +18,12 @@ pub static LAW: Law = Law {
         widths.flat_map(|w| [vec![w, 0.45, 0.5], vec![w, 0.45, 0.8]]).collect()
     },
     starts_from_rest: false,
-    term: |frame, shape| {
-        let (extra, lag) = crossing(frame, 1e-3 * shape[0], shape[1], shape[2]);
-        let table = if frame.columns.table.is_some() { frame.judged_table(&lag) } else { Vec::new() };
-        Term { fixed: Some(Trace { torque: frame.judged(&extra), table }), regressors: Vec::new() }
+    terms: |frame, shapes| {
+        each(shapes, |shape| {
+            let (extra, lag) = crossing(frame, 1e-3 * shape[0], shape[1], shape[2]);
+            let table = if frame.columns.table.is_some() { frame.judged_table(&lag) } else { Vec::new() };
+            Term { fixed: Some(Trace { torque: frame.judged(&extra), table }), regressors: Vec::new() }
+        })
     },
     effect: |_, shape, _| {
         let [width_um, table_inertia_share, table_friction_share] = shape.try_into().ok()?;
@@ -57,6 +59,11 @@ fn crossing(frame: &Frame, width: f64, inertia_share: f64, share: f64) -> (Vec<f
             let bend = (next_speed - speed) / h;
             let carried =
                 |w: f64| inertia * bend + rub * direction(w, frame.direction[i]) + share * b.viscous * w + b.constant;
+            // In contact, and pushed all through the row: the common case.
+            if !free && side * carried(speed) > 0.0 && side * carried(next_speed) > 0.0 && speed * next_speed > 0.0 {
+                lag[i] = -side * half;
+                continue;
+            }
             let mut missing = 0.0;
             for k in 0..STEPS {
                 let at = (k as f64 + 0.5) / STEPS as f64;

@@ -9,10 +9,12 @@ pub static LAW: Law = Law {
     scales: &[Scale::Linear(1.5, 1e6, 0.02)],
     starts: |frame, rest| periods::along_stroke(frame, rest.torque),
     starts_from_rest: true,
-    term: |frame, shape| {
-        let (sine, cosine) = periods::waves(frame, shape[0]);
-        let (sine, cosine) = (frame.judged(&sine), frame.judged(&cosine));
-        Term { fixed: None, regressors: vec![Trace::torque(sine), Trace::torque(cosine)] }
+    terms: |frame, shapes| {
+        each(shapes, |shape| {
+            let (sine, cosine) = periods::waves(frame, shape[0]);
+            let (sine, cosine) = (frame.judged(&sine), frame.judged(&cosine));
+            Term { fixed: None, regressors: vec![Trace::torque(sine), Trace::torque(cosine)] }
+        })
     },
     effect: |frame, shape, c| {
         let [sine, cosine] = c.try_into().ok()?;

@@ -14,10 +14,12 @@ pub static LAW: Law = Law {
         (-count..=count).filter(|i| *i != 0).map(|i| vec![f64::from(i) * step]).collect()
     },
     starts_from_rest: false,
-    term: |frame, shape| {
-        let moved = frame.torque(1e-3 * shape[0]);
-        let fixed = frame.torque(0.0).iter().zip(moved).map(|(a, b)| a - b).collect();
-        Term { fixed: Some(Trace::torque(fixed)), regressors: Vec::new() }
+    terms: |frame, shapes| {
+        each(shapes, |shape| {
+            let moved = frame.torque(1e-3 * shape[0]);
+            let fixed = frame.torque(0.0).iter().zip(moved).map(|(a, b)| a - b).collect();
+            Term { fixed: Some(Trace::torque(fixed)), regressors: Vec::new() }
+        })
     },
     effect: |_, shape, _| Some(Effect::DeadTime { delay_ms: *shape.first()? }),
     confused_with: &[Cause::InertiaMismatch, Cause::ViscousFrictionMismatch],

@@ -20,9 +20,9 @@ pub static LAW: Law = Law {
         frequencies.map(|f| vec![f, 0.33, 0.7, 0.04]).collect()
     },
     starts_from_rest: false,
-    term: |frame, shape| match effect(frame, shape) {
-        Some(effect) => table_side::term(frame, effect),
-        None => Term::default(),
+    terms: |frame, shapes| {
+        let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(frame, shape)).collect();
+        table_side::terms(frame, &effects)
     },
     effect: |frame, shape, _| effect(frame, shape),
     confused_with: &[Cause::InertiaMismatch, Cause::Backlash, Cause::PreslidingFriction],

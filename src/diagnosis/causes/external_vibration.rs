@@ -1,7 +1,6 @@
 //! A disturbance periodic in time, not in position: amplitude·sin(2π·f·t + phase); pumps, fans, neighbours.
 
 use super::*;
-use std::f64::consts::TAU;
 
 /// Parameter: periods over the recording. Coefficients: sine and cosine.
 pub static LAW: Law = Law {
@@ -9,11 +8,15 @@ pub static LAW: Law = Law {
     scales: &[Scale::Linear(3.0, 1e9, 0.02)],
     starts: |frame, rest| periods::along_time(frame, rest.torque),
     starts_from_rest: true,
-    term: |frame, shape| {
-        let omega = TAU * shape[0] / duration(frame);
-        let sine = frame.judged_by(|i| (omega * frame.seconds(i)).sin());
-        let cosine = frame.judged_by(|i| (omega * frame.seconds(i)).cos());
-        Term { fixed: None, regressors: vec![Trace::torque(sine), Trace::torque(cosine)] }
+    terms: |frame, shapes| {
+        each(shapes, |shape| {
+            let per_second = shape[0] / duration(frame);
+            let rows = 0..frame.x.len();
+            let (sine, cosine): (Vec<f64>, Vec<f64>) =
+                rows.map(|i| periods::sine_cosine(per_second * frame.seconds(i))).unzip();
+            let (sine, cosine) = (frame.judged(&sine), frame.judged(&cosine));
+            Term { fixed: None, regressors: vec![Trace::torque(sine), Trace::torque(cosine)] }
+        })
     },
     effect: |frame, shape, c| {
         let [sine, cosine] = c.try_into().ok()?;

@@ -8,7 +8,7 @@ pub static LAW: Law = Law {
     scales: &[],
     starts: one_start,
     starts_from_rest: false,
-    term: |frame, _| Term::torque(frame.acceleration.clone()),
+    terms: |frame, shapes| each(shapes, |_| Term::torque(frame.acceleration.clone())),
     effect: |frame, _, c| {
         let inertia = frame.belief.inertia + c.first()?;
         (inertia > 0.1 * frame.belief.inertia).then_some(Effect::InertiaMismatch { inertia })

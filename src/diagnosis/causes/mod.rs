@@ -98,8 +98,8 @@ pub struct Law {
     pub starts: fn(&Frame, &Rest) -> Vec<Vec<f64>>,
     /// Whether the starts depend on what is left.
     pub starts_from_rest: bool,
-    /// The trace at given non-linear parameters.
-    pub term: fn(&Frame, &[f64]) -> Term,
+    /// The traces at given non-linear parameters, one for each set of them.
+    pub terms: fn(&Frame, &[Vec<f64>]) -> Vec<Term>,
     /// The effect that parameters and coefficients stand for; `None` beyond physical bounds.
     pub effect: fn(&Frame, &[f64], &[f64]) -> Option<Effect>,
     /// What leaves a similar trace.
@@ -141,6 +141,11 @@ pub static LAWS: &[&Law] = &[
 #[must_use]
 pub fn law(cause: Cause) -> &'static Law {
     LAWS.iter().find(|law| law.cause == cause).copied().unwrap_or(&inertia_mismatch::LAW)
+}
+
+/// The traces one by one, where nothing is gained by making them together.
+fn each(shapes: &[Vec<f64>], term: impl Fn(&[f64]) -> Term) -> Vec<Term> {
+    shapes.iter().map(|shape| term(shape)).collect()
 }
 
 /// The start of a law without non-linear parameters.

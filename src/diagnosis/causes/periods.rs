@@ -12,11 +12,27 @@ const MOST: usize = 2;
 /// Sine and cosine with this many periods over the stroke, every row.
 pub fn waves(frame: &Frame, periods: f64) -> (Vec<f64>, Vec<f64>) {
     let (low, high) = frame.stroke();
-    let k = TAU * periods / (high - low);
+    let k = periods / (high - low);
     // Faster than nearly half a period a row the wave would alias, at a steady speed into a constant.
-    let fastest = 0.45 * TAU / (k * frame.columns.period_s);
-    let at = |(x, v): (&f64, &f64)| if v.abs() > fastest { (0.0, 0.0) } else { (k * (x - low)).sin_cos() };
+    let fastest = 0.45 / (k * frame.columns.period_s);
+    let at = |(x, v): (&f64, &f64)| if v.abs() > fastest { (0.0, 0.0) } else { sine_cosine(k * (x - low)) };
     frame.x.iter().zip(&frame.v).map(at).unzip()
+}
+
+/// Sine and cosine of so many turns, to 1e-7. The library's are exact to the last bit and take several times as long, and
+/// waves of every period at every row are what a search for ripples is made of.
+#[inline]
+pub fn sine_cosine(turns: f64) -> (f64, f64) {
+    let rest = turns - turns.round();
+    // sin over a quarter turn either side of zero by its series; beyond it the sine comes back the same way.
+    let sine = |quarter: f64| {
+        let a = TAU * quarter;
+        let s = a * a;
+        let tail = 1.0 / 362_880.0 + s * (-1.0 / 39_916_800.0 + s / 6_227_020_800.0);
+        a * (1.0 + s * (-1.0 / 6.0 + s * (1.0 / 120.0 + s * (-1.0 / 5040.0 + s * tail))))
+    };
+    let folded = if rest.abs() > 0.25 { 0.5f64.copysign(rest) - rest } else { rest };
+    (sine(folded), sine(0.25 - rest.abs()))
 }
 
 /// Numbers of periods over the stroke at which the rest repeats most, and those that the drive suggests.
@@ -47,32 +63,66 @@ pub fn along_stroke(frame: &Frame, rest: &[f64]) -> Vec<Vec<f64>> {
 
 /// Numbers of periods over the recording at which the rest repeats most.
 pub fn along_time(frame: &Frame, rest: &[f64]) -> Vec<Vec<f64>> {
+    let Some((mut bins, stride)) = rows_in_time(frame, rest) else { return Vec::new() };
+    let length = bins.len() as f64;
+    let cycles = (frame.x.len() - 1) as f64 / stride as f64 / length;
+    // Ten periods at least.
+    peaks(&mut bins, (10.0 / cycles) as usize, (length * visible(frame, stride)) as usize, cycles)
+}
+
+/// Amplitudes of lines over frequency, Hz: the largest within each of some hundred bands of equal ratio.
+pub fn spectrum(frame: &Frame, rest: &[f64]) -> Vec<(f64, f64)> {
+    let Some((mut bins, stride)) = rows_in_time(frame, rest) else { return Vec::new() };
+    let hz = 1.0 / (bins.len() as f64 * stride as f64 * frame.columns.period_s);
+    let most = (bins.len() as f64 * visible(frame, stride)) as usize;
+    let power = power(&mut bins);
+    let lowest = (1.0 / (hz * frame.seconds(frame.x.len() - 1))).ceil().max(1.0) as usize;
+    let ratio = (most as f64 / lowest as f64).max(1.0).powf(1.0 / 160.0);
+    let mut out = Vec::new();
+    let mut low = lowest;
+    while low < most.min(power.len()) {
+        let high = ((low as f64 * ratio).ceil() as usize).max(low + 1).min(power.len());
+        let (at, largest) = (low..high).map(|i| (i, power[i])).fold((low, 0.0), |m, p| if p.1 > m.1 { p } else { m });
+        out.push((at as f64 * hz, 2.0 * largest.sqrt() / rest.len() as f64));
+        low = high;
+    }
+    out
+}
+
+/// The rest on an even raster in time, padded to twice its length, and the rows of its step.
+fn rows_in_time(frame: &Frame, rest: &[f64]) -> Option<(Vec<f64>, usize)> {
     let stride = frame.kept.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(1).max(1);
     let rows = frame.x.len() / stride + 1;
     if rows < 64 {
-        return Vec::new();
+        return None;
     }
-    let length = (2 * rows).next_power_of_two();
-    let mut bins = vec![0.0; length];
+    let mut bins = vec![0.0; (2 * rows).next_power_of_two()];
     for (&row, value) in frame.kept.iter().zip(rest) {
         if let Some(bin) = bins.get_mut(row / stride) {
             *bin += value;
         }
     }
-    let cycles = (frame.x.len() - 1) as f64 / stride as f64 / length as f64;
-    // Ten periods at least, and nothing that the filter has taken away.
-    let most = (length as f64 * (0.45_f64).min(0.6 * stride as f64 / frame.low_pass.width as f64)) as usize;
-    peaks(&mut bins, (10.0 / cycles) as usize, most, cycles)
+    Some((bins, stride))
 }
 
-/// The largest local peaks of the power spectrum in each octave between two bins, as multiples of `unit`.
-fn peaks(values: &mut [f64], from: usize, to: usize, unit: f64) -> Vec<Vec<f64>> {
+/// Highest frequency that is looked at, in cycles a step: nothing that the filter takes away.
+fn visible(frame: &Frame, stride: usize) -> f64 {
+    (0.45_f64).min(0.6 * stride as f64 / frame.low_pass.width as f64)
+}
+
+/// Power of each bin of the Fourier transform; nothing where it fails.
+fn power(values: &mut [f64]) -> Vec<f64> {
     let fft = RealFftPlanner::<f64>::new().plan_fft_forward(values.len());
     let mut spectrum = fft.make_output_vec();
     if fft.process(values, &mut spectrum).is_err() {
         return Vec::new();
     }
-    let power: Vec<f64> = spectrum.iter().map(|c| c.norm_sqr()).collect();
+    spectrum.iter().map(|c| c.norm_sqr()).collect()
+}
+
+/// The largest local peaks of the power spectrum in each octave between two bins, as multiples of `unit`.
+fn peaks(values: &mut [f64], from: usize, to: usize, unit: f64) -> Vec<Vec<f64>> {
+    let power = power(values);
     let to = to.min(power.len().saturating_sub(1));
     // By octaves: what is left of slower causes stands high at long periods and must not hide a fine ripple.
     let mut starts = Vec::new();
@@ -98,4 +148,18 @@ pub fn origin(axis: &Axis, period_mm: f64) -> String {
         }
     }
     "magnets, slots or a gear repeat with it".to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sines_of_turns_are_those_of_the_library() {
+        for i in -4000..4000 {
+            let turns = f64::from(i) * 1.7e-3;
+            let ((sine, cosine), (s, c)) = (sine_cosine(turns), (TAU * turns).sin_cos());
+            assert!((sine - s).abs() < 1e-7 && (cosine - c).abs() < 1e-7, "{turns}");
+        }
+    }
 }

@@ -13,9 +13,11 @@ pub static LAW: Law = Law {
             .collect()
     },
     starts_from_rest: false,
-    term: |frame, shape| {
-        let (centre, width) = place(frame, shape);
-        Term::torque(frame.judged_by(|i| frame.direction[i] * (-((frame.x[i] - centre) / width).powi(2)).exp()))
+    terms: |frame, shapes| {
+        each(shapes, |shape| {
+            let (centre, width) = place(frame, shape);
+            Term::torque(frame.judged_by(|i| frame.direction[i] * (-((frame.x[i] - centre) / width).powi(2)).exp()))
+        })
     },
     effect: |frame, shape, c| {
         let (centre_mm, width_mm) = place(frame, shape);

@@ -12,9 +12,11 @@ pub static LAW: Law = Law {
         log_spaced(least, (least * 10.0).max(500.0), 14).map(|d| vec![d]).collect()
     },
     starts_from_rest: false,
-    term: |frame, shape| {
-        let state = build_up(frame, shape[0] * 1e-3);
-        Term::torque(frame.judged_by(|i| state[i] - frame.direction[i]))
+    terms: |frame, shapes| {
+        each(shapes, |shape| {
+            let state = build_up(frame, shape[0] * 1e-3);
+            Term::torque(frame.judged_by(|i| state[i] - frame.direction[i]))
+        })
     },
     effect: |frame, shape, c| {
         let level = *c.first()?;

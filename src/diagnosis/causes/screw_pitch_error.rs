@@ -8,9 +8,11 @@ pub static LAW: Law = Law {
     scales: &[],
     starts: |_, rest| if rest.table.is_empty() { Vec::new() } else { vec![Vec::new()] },
     starts_from_rest: false,
-    term: |frame, _| Term {
-        fixed: None,
-        regressors: vec![Trace::table(frame.kept.iter().map(|&i| 1e-6 * frame.x[i]).collect())],
+    terms: |frame, shapes| {
+        each(shapes, |_| Term {
+            fixed: None,
+            regressors: vec![Trace::table(frame.kept.iter().map(|&i| 1e-6 * frame.x[i]).collect())],
+        })
     },
     effect: |_, _, c| Some(Effect::ScrewPitchError { scale_um_m: *c.first()? }),
     confused_with: &[Cause::ScrewPeriodicError],

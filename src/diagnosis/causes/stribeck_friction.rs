@@ -11,9 +11,11 @@ pub static LAW: Law = Law {
         log_spaced(2e-3 * top, 0.4 * top, 12).map(|v| vec![v]).collect()
     },
     starts_from_rest: false,
-    term: |frame, shape| {
-        let vs = shape[0];
-        Term::torque(frame.judged_by(|i| frame.direction[i] * (-(frame.v[i] / vs).powi(2)).exp()))
+    terms: |frame, shapes| {
+        each(shapes, |shape| {
+            let vs = shape[0];
+            Term::torque(frame.judged_by(|i| frame.direction[i] * (-(frame.v[i] / vs).powi(2)).exp()))
+        })
     },
     effect: |frame, shape, c| {
         let (torque, velocity_mm_s) = (*c.first()?, *shape.first()?);

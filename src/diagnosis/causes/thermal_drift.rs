@@ -8,9 +8,11 @@ pub static LAW: Law = Law {
     scales: &[Scale::Log(0.02, 3.0)],
     starts: |_, _| log_spaced(0.04, 2.0, 9).map(|share| vec![share]).collect(),
     starts_from_rest: false,
-    term: |frame, shape| {
-        let tau = shape[0] * duration(frame);
-        Term::torque(frame.judged_by(|i| frame.direction[i] * (-frame.seconds(i) / tau).exp()))
+    terms: |frame, shapes| {
+        each(shapes, |shape| {
+            let tau = shape[0] * duration(frame);
+            Term::torque(frame.judged_by(|i| frame.direction[i] * (-frame.seconds(i) / tau).exp()))
+        })
     },
     effect: |frame, shape, c| {
         let (drop, time_constant_s) = (*c.first()?, shape.first()? * duration(frame));

@@ -9,10 +9,13 @@ pub static LAW: Law = Law {
     scales: &[Scale::Log(0.25, 0.98)],
     starts: |_, _| (0..9).map(|i| vec![0.3 + 0.075 * f64::from(i)]).collect(),
     starts_from_rest: false,
-    term: |frame, shape| {
-        let limit = shape[0] * peak(frame);
-        let beyond: Vec<f64> = frame.columns.torque.iter().map(|t| t.signum() * (t.abs() - limit).max(0.0)).collect();
-        Term::torque(frame.aligned(&beyond))
+    terms: |frame, shapes| {
+        each(shapes, |shape| {
+            let limit = shape[0] * peak(frame);
+            let beyond: Vec<f64> =
+                frame.columns.torque.iter().map(|t| t.signum() * (t.abs() - limit).max(0.0)).collect();
+            Term::torque(frame.aligned(&beyond))
+        })
     },
     effect: |frame, shape, c| {
         let slope_ratio = 1.0 - c.first()?;

@@ -1,0 +1,60 @@
+//! The picture of a diagnosis: the residual before and after against everything it may go with.
+
+use super::plot::{Colour, Mark, Panel, PlotError, Series, svg};
+use crate::diagnosis::{Coordinate, Diagnosis, View};
+
+/// Draws the residual against every coordinate as SVG, one panel each.
+///
+/// # Errors
+/// The diagnosis shows nothing: the recording did not suffice.
+pub fn picture(diagnosis: &Diagnosis) -> Result<String, PlotError> {
+    let panels: Vec<Panel> = diagnosis.shown.iter().map(|view| panel(diagnosis, view)).collect();
+    svg(&panels)
+}
+
+fn panel(diagnosis: &Diagnosis, view: &View) -> Panel {
+    let drive = diagnosis.extended.drive;
+    let unit = if drive.is_linear() { "N" } else { "N·m" };
+    let load = if drive.is_rotary() { "°" } else { "mm" };
+    let spectrum = view.coordinate == Coordinate::Frequency;
+    let named = !diagnosis.findings.is_empty();
+    let share = |share: f64| format!("{:.0} %", 100.0 * share);
+    let goes = if named {
+        format!("{} of the variance as believed, {} of what is left", share(view.before), share(view.after))
+    } else {
+        format!("{} of the variance", share(view.before))
+    };
+    let x_label = match view.coordinate {
+        Coordinate::Position => format!("position / {load}"),
+        Coordinate::Velocity => format!("velocity / {load}/s"),
+        Coordinate::Direction => "direction".to_owned(),
+        Coordinate::Acceleration => format!("acceleration / {load}/s²"),
+        Coordinate::Time => "time / s".to_owned(),
+        Coordinate::SinceReversal => format!("log₁₀ of the travel since the reversal in {load}"),
+        Coordinate::Frequency => "log₁₀ of the frequency in Hz".to_owned(),
+    };
+    let log = spectrum || view.coordinate == Coordinate::SinceReversal;
+    let at = |x: f64| if log { x.log10() } else { x };
+    let line = |name: &str, colour, pick: fn(&(f64, f64, f64)) -> f64| {
+        let points: Vec<(f64, f64)> = view.curve.iter().map(|p| (at(p.0), pick(p))).collect();
+        let dots =
+            if view.coordinate == Coordinate::Direction { Mark::Dots(points.clone()) } else { Mark::Line(points) };
+        Series { name: name.into(), colour, marks: vec![dots] }
+    };
+    let mut series = vec![line("as believed", Colour::Orange, |p| p.1)];
+    if named {
+        series.push(line("with the causes named", Colour::Blue, |p| p.2));
+    }
+    Panel {
+        title: format!(
+            "Residual {} by {}, axis {}",
+            drive.torque_word(),
+            view.coordinate.name(),
+            diagnosis.extended.name.to_uppercase()
+        ),
+        subtitle: format!("goes with it: {goes}"),
+        x_label,
+        y_label: format!("{} / {unit}", if spectrum { "amplitude" } else { "mean residual" }),
+        series,
+    }
+}
