@@ -46,7 +46,7 @@ pub fn on_holdout(axis: &Axis, extended: &Axis, observed: &Observed, watch: &Wat
     Ok(gains(axis, before, after))
 }
 
-/// The gains on the fitted recording itself: every other block is predicted by a machine that was fitted without it.
+/// The gains on the fitted recording itself: half of its blocks are predicted by a machine that was fitted to the others.
 ///
 /// # Errors
 /// [`Stopped`] when the watch's caller said so.
@@ -73,15 +73,21 @@ pub fn on_held_out_blocks(
     Ok(gains(axis, before, &after))
 }
 
-/// The axis with effects whose coefficients are fitted without the blocks of one half (even or odd).
+/// The axis with effects whose coefficients are fitted without the blocks of one half.
 fn fitted_without(axis: &Axis, bench: &Bench, fit: &Fit, half: usize) -> Axis {
-    let coefficients = bench.coefficients_without(fit, |block| block % 2 == half);
+    let coefficients = bench.coefficients_without(fit, |block| half_of(block) == half);
     let effect = |(i, part): (usize, &super::fit::Part)| {
         let of = |c: &[f64]| (part.law.effect)(bench.frame, &part.shape, c);
         of(&coefficients[i]).or_else(|| of(&fit.coefficients[i])).map(|e| belief::together(axis, e))
     };
     let effects: Vec<Effect> = fit.parts.iter().enumerate().filter_map(effect).collect();
     belief::extended(axis, &effects)
+}
+
+/// The half that a block belongs to, by the sequence of Thue and Morse: blocks that alternate might fall in step with moves
+/// that repeat, and each half would lack what the other is judged on.
+fn half_of(block: usize) -> usize {
+    block.count_ones() as usize % 2
 }
 
 /// For each row the half its block belongs to, 2 for rows before the first and after the last block.
@@ -95,7 +101,7 @@ fn half_of_rows(bench: &Bench, time_s: &[f64]) -> Vec<usize> {
         while block + 2 < frame.blocks.len() && t >= begin(block + 1) {
             block += 1;
         }
-        if t < begin(0) || t > last { 2 } else { block % 2 }
+        if t < begin(0) || t > last { 2 } else { half_of(block) }
     };
     time_s.iter().map(of).collect()
 }
