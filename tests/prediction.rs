@@ -46,13 +46,22 @@ fn within(figures: &serde_json::Value, key: &str, low: f64, high: f64) {
     assert!(value >= low && value <= high, "{key}: {value}, expected {low} to {high}");
 }
 
-/// A real axis, and the reference model that others fitted to it (2.2 N RMS in their own filtering).
+/// A real axis, and the reference model that others fitted to it (2.2 N RMS in their own filtering). By the contract a row
+/// shows the torque of the cycle before; this drive logs that of the row's own cycle, half a cycle to either side of the
+/// motion, so the model as it stands does worse than with the half cycle taken back.
 #[test]
 fn emps_is_predicted_as_its_reference_model_should() {
     let Some(folder) = data("emps") else { return };
-    let figures = figures(&folder.join("machine.json"), &folder.join("emps.csv"));
-    within(&figures, "residual_torque_rms", 2.1, 2.45);
-    within(&figures, "residual_position_rms_um", 1.2, 2.0);
+    let (machine, recording) = (folder.join("machine.json"), folder.join("emps.csv"));
+    let by_contract = figures(&machine, &recording);
+    within(&by_contract, "residual_torque_rms", 2.5, 2.9);
+    within(&by_contract, "residual_position_rms_um", 1.2, 2.0);
+    let mut aligned: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&machine).unwrap()).unwrap();
+    aligned["axes"][0]["effects"] = serde_json::json!([{"cause": "dead_time", "parameters": {"delay_ms": -0.5}}]);
+    let written = tempfile::tempdir().unwrap();
+    let machine = written.path().join("aligned.json");
+    std::fs::write(&machine, aligned.to_string()).unwrap();
+    within(&figures(&machine, &recording), "residual_torque_rms", 2.1, 2.45);
 }
 
 /// A recording by another simulator, of an axis that is as its machine file says: what is left is its sensors' noise.
