@@ -10,6 +10,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -74,12 +75,55 @@ static int32_t backlash_cycle(void)
     return out->phase;
 }
 
+/* Recorder: rows on and on, some of them refused, and one ring after the other ended. */
+static struct {
+    gib_recorder *gib[4];
+    uint64_t cycle;
+    double outputs[12];
+} recorder;
+
+static void recorder_prepare(void)
+{
+    recorder.cycle = 0;
+    for (int i = 0; i < 4; i++) {
+        char name[32];
+        snprintf(name, sizeof name, "realtime-%d-%d", (int)getpid(), i);
+        gib_recorder_config config = {.struct_size = sizeof config,
+                                      .channels = 12,
+                                      .every_cycles = 1 + (uint32_t)i,
+                                      .cycle_s = 0.001,
+                                      .name = name,
+                                      .machine = "rig",
+                                      .columns = "a,b,c,d,e,f,g,h,i,j,k,l"};
+        recorder.gib[i] = gib_recorder_new();
+        gib_recorder_start(recorder.gib[i], &config);
+        /* The child is not to tidy up after itself, it is killed or ends at once: the name goes now, the memory later. */
+        char path[48];
+        snprintf(path, sizeof path, "/dev/shm/gib-%s", name);
+        unlink(path);
+    }
+}
+
+static int32_t recorder_cycle(void)
+{
+    uint64_t n = recorder.cycle++, i = n / 250 % 4;
+    for (int k = 0; k < 12; k++) {
+        recorder.outputs[k] = (double)n + 0.5 * k;
+    }
+    int32_t status = gib_recorder_step(recorder.gib[i], recorder.outputs, n % 97 ? 12 : 11);
+    if (n == 900000) {
+        gib_recorder_abort(recorder.gib[1]);
+    }
+    return status == GIB_BUSY ? 1 : status == GIB_ERR_RECORDER_COUNT ? 2 : status == GIB_ERR_ABORTED ? 3 : 0;
+}
+
 /* Further families go here. `phases`: those that the million cycles must have been in, one bit each. */
 static const struct {
     realtime_family family;
     uint32_t phases;
 } FAMILIES[] = {
     {{"backlash", backlash_prepare, backlash_cycle, backlash.outputs, 5}, (1u << (GIB_BACKLASH_FAILED + 1)) - 1u},
+    {{"recorder", recorder_prepare, recorder_cycle, recorder.outputs, 12}, 1u << 1 | 1u << 2 | 1u << 3},
 };
 #define FAMILY_COUNT (sizeof FAMILIES / sizeof *FAMILIES)
 

@@ -364,6 +364,26 @@
 #define GIB_ERR_SPEED_VARIATION_NONE (-403)
 
 /**
+ * Another living process records under this name.
+ */
+#define GIB_ERR_RECORDER_IN_USE (-1000)
+
+/**
+ * The name belongs to shared memory that is no recorder's, or to another user's.
+ */
+#define GIB_ERR_RECORDER_FOREIGN (-1001)
+
+/**
+ * The name of a column is misspelled, has a unit that its signal cannot have, or stands twice; `value` is its number.
+ */
+#define GIB_ERR_RECORDER_COLUMN (-1002)
+
+/**
+ * A step gave another number of values than there are channels; no row was written.
+ */
+#define GIB_ERR_RECORDER_COUNT (-1003)
+
+/**
  * Slow-feed mode (default): the motor is fed slowly and the torque read in every cycle. The more accurate one.
  */
 #define GIB_BACKLASH_SLOW_FEED 0
@@ -796,6 +816,11 @@ typedef struct gib_inertia gib_inertia;
  * Reads and writes part programs, and keeps why the last call failed. Opaque; its size is `gib_program_size()`.
  */
 typedef struct gib_program gib_program;
+
+/**
+ * A recorder. Opaque; its size is `gib_recorder_size()`.
+ */
+typedef struct gib_recorder gib_recorder;
 
 /**
  * A speed variation of one spindle. Opaque; its size is `gib_speed_variation_size()`.
@@ -1769,6 +1794,85 @@ typedef struct gib_inertia_report {
 } gib_inertia_report;
 
 /**
+ * What to record, under which name. Zero in a field means its default; fields marked "required" have none.
+ */
+typedef struct gib_recorder_config {
+    /**
+     * Size of this struct as the caller knows it: `sizeof(gib_recorder_config)`. Required.
+     */
+    uint32_t struct_size;
+    /**
+     * Values in every row, 1 to 64. Required.
+     */
+    uint32_t channels;
+    /**
+     * Rows in the ring, 16 to what makes 1 GiB (default: four seconds of rows). A reader that is away longer loses rows.
+     */
+    uint32_t capacity_rows;
+    /**
+     * Servo cycles from row to row, 1 to 1000000 (default 1).
+     */
+    uint32_t every_cycles;
+    /**
+     * Permissions of the shared memory, from 0600 (default: who records may read) to 0666.
+     */
+    uint32_t mode;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+    /**
+     * Servo period, 0.000001 to 1 s. Required.
+     */
+    double cycle_s;
+    /**
+     * Name under which `gib record` finds it: 1 to 40 letters, digits, `-`, `_`, `.`. Copied. Required.
+     */
+    const char *name;
+    /**
+     * Name of the machine, which every recording carries: 1 to 40 letters, digits, `-`, `_`. Copied. Required.
+     */
+    const char *machine;
+    /**
+     * Names of the columns, one a channel, separated by commas: "x.position_mm,x.torque_nm". At most 3775 bytes. A
+     * signal of the recording format must have a unit that it can have; other names are recorded as they are.
+     * Copied. Required.
+     */
+    const char *columns;
+} gib_recorder_config;
+
+/**
+ * What a recorder has done.
+ */
+typedef struct gib_recorder_report {
+    /**
+     * Rows written since the start.
+     */
+    uint64_t rows;
+    /**
+     * Bytes of shared memory.
+     */
+    uint64_t bytes;
+    /**
+     * Rows in the ring.
+     */
+    uint32_t capacity_rows;
+    /**
+     * Values in a row.
+     */
+    uint32_t channels;
+    /**
+     * 1: the memory is locked and never paged out. 0: the system refused the lock (RLIMIT_MEMLOCK); the pages are there
+     * all the same, and only a machine short of memory can take them away.
+     */
+    int32_t locked;
+    /**
+     * What the last step returned.
+     */
+    int32_t status;
+} gib_recorder_report;
+
+/**
  * What to vary, by which motor. Zero in a field means its default; fields marked "required" have none.
  */
 typedef struct gib_speed_variation_config {
@@ -2227,6 +2331,46 @@ typedef struct gib_api_table {
      */
     int32_t (*speed_variation_last_error)(const struct gib_speed_variation *handle,
                                           struct gib_error_detail *detail);
+    /**
+     * See gib_recorder_size.
+     */
+    uintptr_t (*recorder_size)(void);
+    /**
+     * See gib_recorder_init_in.
+     */
+    int32_t (*recorder_init_in)(void *memory, uintptr_t size, struct gib_recorder **out);
+    /**
+     * See gib_recorder_new.
+     */
+    struct gib_recorder *(*recorder_new)(void);
+    /**
+     * See gib_recorder_free.
+     */
+    void (*recorder_free)(struct gib_recorder *handle);
+    /**
+     * See gib_recorder_start.
+     */
+    int32_t (*recorder_start)(struct gib_recorder *handle, const struct gib_recorder_config *config);
+    /**
+     * See gib_recorder_step.
+     */
+    int32_t (*recorder_step)(struct gib_recorder *handle, const double *values, uint32_t count);
+    /**
+     * See gib_recorder_abort.
+     */
+    int32_t (*recorder_abort)(struct gib_recorder *handle);
+    /**
+     * See gib_recorder_close.
+     */
+    int32_t (*recorder_close)(struct gib_recorder *handle);
+    /**
+     * See gib_recorder_result.
+     */
+    int32_t (*recorder_result)(const struct gib_recorder *handle, struct gib_recorder_report *report);
+    /**
+     * See gib_recorder_last_error.
+     */
+    int32_t (*recorder_last_error)(const struct gib_recorder *handle, struct gib_error_detail *detail);
 } gib_api_table;
 
 #ifdef __cplusplus
@@ -2879,6 +3023,147 @@ int32_t gib_program_last_error(const struct gib_program *handle,
  * `handle` is NULL or an instance; `text` is NULL or points to `size` writable bytes.
  */
 int32_t gib_program_last_error_text(const struct gib_program *handle, char *text, uintptr_t size);
+
+/**
+ * Bytes that an instance needs in memory of your own, to be aligned to 16.
+ *
+ * @return the size in bytes, below 1 KiB; the ring is not in it.
+ *
+ * [thread: any] [real-time: yes] [state: any]
+ */
+uintptr_t gib_recorder_size(void);
+
+/**
+ * Makes an instance at rest in memory of your own. Call gib_recorder_close before the memory is used for anything else.
+ *
+ * @param memory at least `gib_recorder_size()` bytes, aligned to 16; stays yours.
+ * @param size bytes at `memory`.
+ * @param out receives the handle; NULL on error.
+ * @return GIB_OK; GIB_ERR_NULL; GIB_ERR_MEMORY when too small or misaligned.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ *
+ * # Safety
+ * `memory` is NULL or points to `size` writable bytes; `out` is NULL or writable.
+ */
+int32_t gib_recorder_init_in(void *memory,
+                             uintptr_t size,
+                             struct gib_recorder **out);
+
+/**
+ * Makes an instance at rest in memory that gib allocates.
+ *
+ * @return the handle, to be given to `gib_recorder_free`; NULL when there is no memory.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ */
+struct gib_recorder *gib_recorder_new(void);
+
+/**
+ * Closes and frees an instance made by `gib_recorder_new`. NULL is allowed and does nothing.
+ *
+ * @param handle an instance from `gib_recorder_new`, never one from `gib_recorder_init_in`.
+ *
+ * [thread: setup] [real-time: no] [state: no step runs]
+ *
+ * # Safety
+ * `handle` is NULL or came from `gib_recorder_new` and was not freed before.
+ */
+void gib_recorder_free(struct gib_recorder *handle);
+
+/**
+ * Makes the shared memory, touches and locks all of it, and begins to record with the next step.
+ *
+ * The memory is `/dev/shm/gib-<name>`. What a process that died left under this name is cleared away; a living one keeps it.
+ *
+ * @param handle the instance.
+ * @param config what to record; copied. Set `struct_size`, zero the rest, then set what you want.
+ * @return GIB_OK; GIB_ERR_CONFIG and GIB_ERR_RECORDER_COLUMN (gib_recorder_last_error names the field and its range, or
+ * the number of the column), GIB_ERR_RECORDER_IN_USE, GIB_ERR_RECORDER_FOREIGN, GIB_ERR_MEMORY when there is not that much
+ * shared memory, GIB_ERR_IO, GIB_ERR_STRUCT_SIZE, GIB_ERR_STATE unless closed, GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup] [real-time: no] [state: closed]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `config` is NULL or points to its `struct_size` readable bytes, and its texts are
+ * NULL or NUL-terminated.
+ */
+int32_t gib_recorder_start(struct gib_recorder *handle,
+                           const struct gib_recorder_config *config);
+
+/**
+ * One servo cycle: writes a row when one is due. Never waits for a reader.
+ *
+ * @param handle the instance.
+ * @param values one number a channel, in the order of the columns. A NaN or an infinity is recorded as an empty cell.
+ * @param count numbers at `values`; must be `channels`.
+ * @return GIB_BUSY while recording; GIB_OK at rest; GIB_ERR_ABORTED after gib_recorder_abort; GIB_ERR_RECORDER_COUNT,
+ * GIB_ERR_NULL, GIB_ERR_HANDLE of this call, which wrote no row.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `values` is NULL or points to `count` readable numbers.
+ */
+int32_t gib_recorder_step(struct gib_recorder *handle,
+                          const double *values,
+                          uint32_t count);
+
+/**
+ * Ends the recording: no row is written any more, and readers end by themselves once they have all. Does nothing at rest.
+ *
+ * The shared memory stays until gib_recorder_close, which setup calls.
+ *
+ * @param handle the instance.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance.
+ */
+int32_t gib_recorder_abort(struct gib_recorder *handle);
+
+/**
+ * Ends the recording and gives the shared memory back. Readers that have it open read it to its end.
+ *
+ * @param handle the instance.
+ * @return GIB_OK, also at rest; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup] [real-time: no] [state: no step runs]
+ *
+ * # Safety
+ * `handle` is NULL or an instance.
+ */
+int32_t gib_recorder_close(struct gib_recorder *handle);
+
+/**
+ * Reads what the recorder has done.
+ *
+ * @param handle the instance.
+ * @param report receives it.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `report` is NULL or writable.
+ */
+int32_t gib_recorder_result(const struct gib_recorder *handle, struct gib_recorder_report *report);
+
+/**
+ * Why the last start was refused: code, field, value and bounds.
+ *
+ * @param handle the instance.
+ * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: any] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `detail` is NULL or writable.
+ */
+int32_t gib_recorder_last_error(const struct gib_recorder *handle, struct gib_error_detail *detail);
 
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.

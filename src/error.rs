@@ -131,6 +131,14 @@ pub const GIB_ERR_SPEED_VARIATION_TORQUE: i32 = -401;
 pub const GIB_ERR_SPEED_VARIATION_SPEED: i32 = -402;
 /// Friction and cutting leave the motor nothing to vary the speed with.
 pub const GIB_ERR_SPEED_VARIATION_NONE: i32 = -403;
+/// Another living process records under this name.
+pub const GIB_ERR_RECORDER_IN_USE: i32 = -1000;
+/// The name belongs to shared memory that is no recorder's, or to another user's.
+pub const GIB_ERR_RECORDER_FOREIGN: i32 = -1001;
+/// The name of a column is misspelled, has a unit that its signal cannot have, or stands twice; `value` is its number.
+pub const GIB_ERR_RECORDER_COLUMN: i32 = -1002;
+/// A step gave another number of values than there are channels; no row was written.
+pub const GIB_ERR_RECORDER_COUNT: i32 = -1003;
 
 /// Every status and the sentence that explains it.
 const TEXTS: &[(i32, &str)] = &[
@@ -195,6 +203,10 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_SPEED_VARIATION_TORQUE, "the speed variation needs more torque than the motor has\0"),
     (GIB_ERR_SPEED_VARIATION_SPEED, "the speed variation leaves the speeds allowed\0"),
     (GIB_ERR_SPEED_VARIATION_NONE, "friction and cutting leave the motor nothing to vary the speed with\0"),
+    (GIB_ERR_RECORDER_IN_USE, "another living process records under this name\0"),
+    (GIB_ERR_RECORDER_FOREIGN, "the name belongs to shared memory that is no recorder's, or to another user\0"),
+    (GIB_ERR_RECORDER_COLUMN, "the name of a column is misspelled, in a wrong unit, or stands twice\0"),
+    (GIB_ERR_RECORDER_COUNT, "a step gave another number of values than there are channels\0"),
 ];
 
 /// The text of a status, NUL-terminated and static; for an unknown number a text that says so.

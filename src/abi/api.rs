@@ -8,6 +8,7 @@ use super::backlash::*;
 use super::homing::*;
 use super::inertia::*;
 use super::program::*;
+use super::recorder::*;
 use super::speed_variation::*;
 use super::types::GibErrorDetail;
 use super::{GIB_ABI_VERSION, gib_abi_version, gib_status_text, gib_version};
@@ -175,6 +176,27 @@ pub struct GibApiTable {
     /// See gib_speed_variation_last_error.
     pub speed_variation_last_error:
         unsafe extern "C" fn(handle: *const GibSpeedVariation, detail: *mut GibErrorDetail) -> i32,
+
+    /// See gib_recorder_size.
+    pub recorder_size: extern "C" fn() -> usize,
+    /// See gib_recorder_init_in.
+    pub recorder_init_in: unsafe extern "C" fn(memory: *mut c_void, size: usize, out: *mut *mut GibRecorder) -> i32,
+    /// See gib_recorder_new.
+    pub recorder_new: extern "C" fn() -> *mut GibRecorder,
+    /// See gib_recorder_free.
+    pub recorder_free: unsafe extern "C" fn(handle: *mut GibRecorder),
+    /// See gib_recorder_start.
+    pub recorder_start: unsafe extern "C" fn(handle: *mut GibRecorder, config: *const GibRecorderConfig) -> i32,
+    /// See gib_recorder_step.
+    pub recorder_step: unsafe extern "C" fn(handle: *mut GibRecorder, values: *const f64, count: u32) -> i32,
+    /// See gib_recorder_abort.
+    pub recorder_abort: unsafe extern "C" fn(handle: *mut GibRecorder) -> i32,
+    /// See gib_recorder_close.
+    pub recorder_close: unsafe extern "C" fn(handle: *mut GibRecorder) -> i32,
+    /// See gib_recorder_result.
+    pub recorder_result: unsafe extern "C" fn(handle: *const GibRecorder, report: *mut GibRecorderReport) -> i32,
+    /// See gib_recorder_last_error.
+    pub recorder_last_error: unsafe extern "C" fn(handle: *const GibRecorder, detail: *mut GibErrorDetail) -> i32,
 }
 
 static API: GibApiTable = GibApiTable {
@@ -238,6 +260,17 @@ static API: GibApiTable = GibApiTable {
     speed_variation_result: gib_speed_variation_result,
     speed_variation_possible: gib_speed_variation_possible,
     speed_variation_last_error: gib_speed_variation_last_error,
+
+    recorder_size: gib_recorder_size,
+    recorder_init_in: gib_recorder_init_in,
+    recorder_new: gib_recorder_new,
+    recorder_free: gib_recorder_free,
+    recorder_start: gib_recorder_start,
+    recorder_step: gib_recorder_step,
+    recorder_abort: gib_recorder_abort,
+    recorder_close: gib_recorder_close,
+    recorder_result: gib_recorder_result,
+    recorder_last_error: gib_recorder_last_error,
 };
 
 /// The table of all functions, so that `dlsym` needs one name: "gib_api".

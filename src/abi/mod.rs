@@ -11,6 +11,8 @@ pub mod guard;
 pub mod homing;
 pub mod inertia;
 pub mod program;
+pub mod recorder;
+pub mod shared_memory;
 pub mod speed_variation;
 pub mod types;
 

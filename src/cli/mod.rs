@@ -10,6 +10,7 @@ mod lost_motion;
 mod machine_file;
 mod predict;
 mod program;
+mod record;
 mod simulate;
 mod speed_variation;
 mod table;
@@ -62,6 +63,7 @@ enum Command {
     Inspect(inspect::Inspect),
     Predict(predict::Predict),
     Program(program::Program),
+    Record(record::Record),
     LostMotion(lost_motion::LostMotionCommand),
     Simulate(simulate::Simulate),
     SpeedVariation(speed_variation::SpeedVariationCommand),
@@ -75,6 +77,7 @@ pub fn run() -> ExitCode {
         Command::Inspect(command) => command.run(),
         Command::Predict(command) => command.run(),
         Command::Program(command) => command.run(),
+        Command::Record(command) => command.run(),
         Command::LostMotion(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::SpeedVariation(command) => command.run(),

@@ -9,4 +9,5 @@ pub mod homing;
 pub mod inertia;
 pub mod level;
 pub mod profile;
+pub mod recorder;
 pub mod speed_variation;

@@ -13,7 +13,9 @@ mod error;
 mod label;
 #[cfg(feature = "parquet")]
 mod parquet;
+pub mod ring;
 mod sampling;
+pub mod sink;
 
 use std::borrow::Cow;
 use std::fs::File;
