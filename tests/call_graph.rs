@@ -244,11 +244,15 @@ fn slots_in_register(instructions: &[(u64, &str)], call: usize, register: &str) 
 fn before(instructions: &[(u64, &str)], at: usize) -> Option<Vec<usize>> {
     let falls_through = |code: &str| !["jmp", "ret", "ud2", "notrack jmp"].iter().any(|end| code.starts_with(end));
     let target = |code: &str| code.starts_with('j').then(|| hex(code.split_whitespace().nth(1)?)).flatten();
+    let code_at = |i: usize| instructions[i].1;
     let jumps = |wanted: &dyn Fn(&str) -> bool| -> Vec<usize> {
         (0..instructions.len()).filter(|i| wanted(instructions[*i].1)).collect()
     };
     let mut found = jumps(&|code| target(code) == Some(instructions[at].0));
     found.extend((at > 0 && falls_through(instructions[at - 1].1)).then(|| at - 1));
+    if found.is_empty() && (code_at(at).contains("nop") || code_at(at).starts_with("xchg %ax,%ax")) {
+        return Some(found); // Padding behind a jump, which is never run.
+    }
     if found.is_empty() {
         // Reached through the table of a `match`.
         found = jumps(&|code| code.contains("jmp") && code.contains('*'));
@@ -280,10 +284,6 @@ fn real_time(header: &str) -> BTreeSet<String> {
     tagged
 }
 
-/// A step that keeps the address of a function in a register, whose call this walk cannot follow: named in every run
-/// until it is proven. Everything else that it reaches is checked.
-const OPEN: &str = "gib_homing_step";
-
 #[test]
 fn real_time_functions_reach_nothing_that_waits_or_panics() {
     let header = header();
@@ -293,11 +293,7 @@ fn real_time_functions_reach_nothing_that_waits_or_panics() {
     }
     let Some(folder) = release("call_graph") else { return };
     let library = Library::read(&folder.join("libgib.so"));
-    let (open, faults): (Vec<String>, Vec<String>) = tagged
-        .iter()
-        .flat_map(|root| library.faults_from(root))
-        .partition(|fault| fault.starts_with(OPEN) && fault.ends_with("through a pointer"));
-    open.iter().for_each(|fault| eprintln!("not yet proven: {fault}"));
+    let faults: Vec<String> = tagged.iter().flat_map(|root| library.faults_from(root)).collect();
     assert!(faults.is_empty(), "{}", faults.join("\n"));
     println!("{} real-time functions reach nothing that waits or panics", tagged.len());
 }
@@ -361,6 +357,24 @@ fn seeded_faults_are_seen() {
         let faults = library.faults_from(root);
         assert!(faults.iter().any(|fault| fault.contains(wanted)), "{root}: {faults:?}");
     }
+}
+
+/// Padding between a jump and its neighbour's target, in a function with the table of a `match`, leads from nowhere; an
+/// instruction there that does something may be an entry of the table.
+#[test]
+fn padding_leads_nowhere() {
+    let code = |padding| {
+        [
+            (0x10, "jmp *%rcx"),
+            (0x12, "dec %r13d"),
+            (0x14, "mov 0x88(%rip),%r13        # a0 <slot>"),
+            (0x1b, "jmp 22 <f>"),
+            (0x1d, padding),
+            (0x22, "call *%r13"),
+        ]
+    };
+    assert_eq!(slots_in_register(&code("nopl 0x0(%rax,%rax,1)"), 5, "r13"), Some(vec![0xa0]));
+    assert_eq!(slots_in_register(&code("inc %eax"), 5, "r13"), None);
 }
 
 #[test]

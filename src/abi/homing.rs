@@ -1,6 +1,6 @@
 //! Family `homing`: homing on a dead stop by torque limit, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, placed, versioned};
+use super::guard::{Instance, guarded, instance, instance_mut, placed, versioned};
 use super::types::GibErrorDetail;
 use crate::cycle::homing::config::HomingConfig;
 use crate::cycle::homing::io::{GIB_HOMING_FAILED, HomingInput, HomingOutput};
@@ -12,6 +12,8 @@ use core::ffi::c_void;
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
 const ALIVE: u64 = 0x6769_625f_686f_0001;
+/// The same for an instance that has nothing to do but to follow the axis.
+const QUIET: u64 = 0x6769_625f_686f_0002;
 
 /// Homing of one axis, of one motor or two. Opaque; its size is `gib_homing_size()`.
 #[repr(C, align(16))]
@@ -21,21 +23,31 @@ pub struct GibHoming {
     machine: Homing,
 }
 
-impl super::guard::Instance for GibHoming {
+impl Instance for GibHoming {
     fn alive(&self) -> bool {
-        self.alive == ALIVE
+        self.alive == ALIVE || self.alive == QUIET
     }
     fn new() -> GibHoming {
-        GibHoming { alive: ALIVE, last: Fault::NONE, machine: Homing::default() }
+        GibHoming { alive: QUIET, last: Fault::NONE, machine: Homing::default() }
     }
     fn bury(&mut self) {
         self.alive = 0;
     }
 }
 
+impl GibHoming {
+    /// Renews the mark after the machine may have changed.
+    #[inline(always)]
+    fn mark(&mut self) {
+        self.alive = if self.machine.quiet() { QUIET } else { ALIVE };
+    }
+}
+
 /// Runs a call that can be refused, and keeps the reason for `_last_error`.
 fn refusable(handle: &mut GibHoming, call: impl FnOnce(&mut Homing) -> Result<(), Fault>) -> i32 {
-    match call(&mut handle.machine) {
+    let outcome = call(&mut handle.machine);
+    handle.mark();
+    match outcome {
         Ok(()) => {
             handle.last = Fault::NONE;
             GIB_OK
@@ -150,44 +162,54 @@ pub unsafe extern "C" fn gib_homing_step(
     input: *const HomingInput,
     output: *mut HomingOutput,
 ) -> i32 {
-    // SAFETY: the caller promises each is NULL or valid.
-    let (mut handle, input, mut output) = unsafe { (handle.as_mut(), input.as_ref(), output.as_mut()) };
-    if let (Some(handle), Some(input), Some(output)) = (&mut handle, input, &mut output)
-        && handle.alive == ALIVE
-        && handle.machine.quick(input)
-    {
-        **output = *handle.machine.output();
-        return output.status;
+    if handle.is_null() || input.is_null() || output.is_null() {
+        // SAFETY: the caller promises each is NULL or valid.
+        return unsafe { misused(handle.as_ref(), input.as_ref(), output.as_mut()) };
     }
-    in_full(handle, input, output)
+    // SAFETY: as above, and none is NULL.
+    let (handle, input, output) = unsafe { (&mut *handle, &*input, &mut *output) };
+    // The cheap cycle, in which an axis spends its life. `x * 0` is NaN for NaN and infinity.
+    let [first, second] = input.position_mm;
+    if handle.alive == QUIET && !(first * 0.0 + second * 0.0).is_nan() {
+        *output = *handle.machine.rest_at(input.position_mm);
+        return handle.machine.output().status;
+    }
+    step(handle, input, output)
 }
 
-/// A step that is not like the one before, or a call that was no step.
+/// A cycle in which something is under way. `extern "C"`: it cannot unwind, so that it is called by a jump.
 #[inline(never)]
-fn in_full(handle: Option<&mut GibHoming>, input: Option<&HomingInput>, output: Option<&mut HomingOutput>) -> i32 {
-    match (handle, input, output) {
-        (Some(handle), Some(input), Some(output)) if handle.alive == ALIVE => {
-            handle.machine.step(input);
-            *output = *handle.machine.output();
-            output.status
-        }
-        (handle, input, output) => misused(handle, input, output),
+extern "C" fn step(handle: &mut GibHoming, input: &HomingInput, output: &mut HomingOutput) -> i32 {
+    if handle.alive == ALIVE && handle.machine.quick(input) {
+        *output = *handle.machine.output();
+        return handle.machine.output().status;
     }
+    step_in_full(handle, input, output)
+}
+
+/// Any cycle, or one of no living instance.
+#[inline(never)]
+extern "C" fn step_in_full(handle: &mut GibHoming, input: &HomingInput, output: &mut HomingOutput) -> i32 {
+    if !handle.alive() {
+        return misused(Some(handle), Some(input), Some(output));
+    }
+    handle.machine.step(input);
+    handle.mark();
+    *output = *handle.machine.output();
+    output.status
 }
 
 /// A step without an instance, an input or an output: nothing moves, and the position asked for is the present one.
 #[cold]
-fn misused(handle: Option<&mut GibHoming>, input: Option<&HomingInput>, output: Option<&mut HomingOutput>) -> i32 {
-    let status = match &handle {
-        Some(handle) if handle.alive != ALIVE => GIB_ERR_HANDLE,
-        _ => GIB_ERR_NULL,
-    };
+fn misused(handle: Option<&GibHoming>, input: Option<&HomingInput>, output: Option<&mut HomingOutput>) -> i32 {
+    let living = handle.filter(|handle| handle.alive());
+    let status = if handle.is_some() && living.is_none() { GIB_ERR_HANDLE } else { GIB_ERR_NULL };
     let place = |position: f64| if position.is_finite() { position } else { 0.0 };
     let target_position_mm = input.map_or([0.0; 2], |input| input.position_mm.map(place));
     if let Some(output) = output {
-        *output = match handle {
-            Some(handle) if handle.alive == ALIVE => *handle.machine.output(),
-            _ => HomingOutput { target_position_mm, phase: GIB_HOMING_FAILED, ..HomingOutput::default() },
+        *output = match living {
+            Some(handle) => *handle.machine.output(),
+            None => HomingOutput { target_position_mm, phase: GIB_HOMING_FAILED, ..HomingOutput::default() },
         };
         output.target_speed_mm_s = [0.0; 2];
         output.new_events = 0;
@@ -211,7 +233,9 @@ fn misused(handle: Option<&mut GibHoming>, input: Option<&HomingInput>, output: 
 pub unsafe extern "C" fn gib_homing_abort(handle: *mut GibHoming) -> i32 {
     guarded(|| {
         // SAFETY: the caller's promise.
-        unsafe { instance_mut(handle) }?.machine.abort();
+        let handle = unsafe { instance_mut(handle) }?;
+        handle.machine.abort();
+        handle.mark();
         Ok(GIB_OK)
     })
 }

@@ -97,7 +97,8 @@ impl Profile {
 
 /// The lower of two numbers, neither NaN: one instruction, where `f64::min` takes seven.
 #[inline(always)]
-fn lower(a: f64, b: f64) -> f64 {
+#[must_use]
+pub fn lower(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 

@@ -10,7 +10,7 @@ pub const GIB_HOMING_TOUCH: i32 = 2;
 pub const GIB_HOMING_RETRACT: i32 = 3;
 /// Waits until the deviation is cleared.
 pub const GIB_HOMING_CLEAR: i32 = 4;
-/// Stands while the last touch is evaluated in slices.
+/// Stands while a touch is evaluated in slices.
 pub const GIB_HOMING_EVALUATE: i32 = 5;
 /// Moves off the stop by the zero offset.
 pub const GIB_HOMING_OFFSET: i32 = 6;

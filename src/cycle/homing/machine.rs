@@ -1,7 +1,7 @@
 //! The state machine of homing on a dead stop: one call per servo cycle.
 //!
 //! ```text
-//! Idle → Begin → Limit → Touch → Retract → Touch → … → Touch → Clear → Evaluate → Offset → Set → Done
+//! Idle → Begin → Limit → Touch → Retract → Evaluate → Touch → … → Touch → Clear → Evaluate → Offset → Set → Done
 //!          any state ──fault, abort, deadline, refusal──▶ leave: Stopping → Unload (→ Relieve) → Restore → Failed
 //! ```
 //!
@@ -30,11 +30,11 @@ enum Phase {
     Limit,
     /// Ends when every motor has pressed for the detection time.
     Touch,
-    /// Ends when every motor is back and the touch evaluated.
+    /// Ends when every motor is back.
     Retract,
     /// Ends when the kernel confirms that the deviation is cleared.
     Clear,
-    /// Ends when the last touch is evaluated.
+    /// Ends when the touch is evaluated.
     Evaluate,
     /// Ends at the zero offset.
     Offset,
@@ -63,7 +63,7 @@ pub struct Homing {
     quick: bool,
     /// First fault of this run.
     fault: Fault,
-    /// What the evaluation of a touch found wrong while the axis goes back.
+    /// What the evaluation of the touch found wrong.
     suspect: Fault,
     /// Cycles since the start, when the present state must have ended, and when all must.
     now: u32,
@@ -164,8 +164,23 @@ impl Homing {
     }
 
     /// Cycles since the start.
+    #[inline(always)]
     fn cycles(&self) -> u32 {
         self.now.saturating_add(self.sides[0].quick_cycles())
+    }
+
+    /// True when a step does nothing but follow the axis: nothing is under way, owed or news.
+    #[inline(always)]
+    #[must_use]
+    pub fn quiet(&self) -> bool {
+        !self.busy() && !self.changed && self.output.new_events == 0
+    }
+
+    /// What a step puts out when all is [`Homing::quiet`]. `positions` must be finite.
+    #[inline(always)]
+    pub fn rest_at(&mut self, positions: [f64; 2]) -> &HomingOutput {
+        self.output.target_position_mm = positions;
+        &self.output
     }
 
     /// What was found so far, and what became of it.
@@ -202,7 +217,7 @@ impl Homing {
     /// One servo cycle that is not [`Homing::quick`].
     pub fn step(&mut self, input: &HomingInput) {
         self.now = self.cycles();
-        self.sides.iter_mut().for_each(|side| side.look_ahead(&self.plan, 0));
+        self.sides[0].look_no_further();
         self.output.new_events = 0;
         match self.phase {
             Phase::Idle | Phase::Done | Phase::Failed => self.rest(input),

@@ -5,7 +5,7 @@
 
 use super::plan::{Plan, STUCK_BLOCKS};
 use super::trace::Trace;
-use crate::cycle::profile::Profile;
+use crate::cycle::profile::{Profile, lower};
 use crate::error::*;
 
 /// Share of a new sample in the filtered torque: eight cycles.
@@ -38,9 +38,15 @@ pub enum Touch {
 pub struct Side {
     /// The command.
     pub profile: Profile,
-    /// Cycles for which the command surely goes on at its speed, far from any bound of way and time.
+    /// Cycles for which the command surely goes on at its speed, far from any bound of way and time; the lag about
+    /// which they count as usual, and by how much it may differ.
     cruise: u32,
     granted: u32,
+    usual_lag: f64,
+    lag_band: f64,
+    /// Cycles for which a pressed motor may stand on before it is looked at again, and how far it may stray.
+    stand: u32,
+    stray: f64,
     /// Where homing began, mm.
     pub start: f64,
     /// Where the present touch began, mm.
@@ -194,16 +200,17 @@ impl Side {
 
     /// One cycle in a few instructions, for one that is like the one before: at constant speed, encoder and torque
     /// alive, all within bounds. False when it is not; nothing has changed then. The bounds are those of [`Side::safe`];
-    /// those of way and time are in `cruise`.
+    /// those of way and time are in `cruise`, those of lag and jump in `lag_band`.
     #[inline(always)]
     pub fn quick(&mut self, plan: &Plan, position: f64, torque: f64) -> bool {
+        if self.cruise == 0 {
+            return self.quick_stand(plan, position, torque);
+        }
         let filtered = (1.0 - GAIN) * self.filtered + plan.torque_share * torque;
-        let moved = (position - self.position).abs();
+        let lag = self.profile.position - position;
         // Written so that a NaN is not usual.
-        let usual = self.cruise != 0
-            && (self.profile.position - position).abs() <= plan.lag_limit
-            && moved <= plan.jump
-            && moved > 0.0
+        let usual = (lag - self.usual_lag).abs() <= self.lag_band
+            && position != self.position
             && filtered > plan.bound_below
             && filtered < self.trip;
         if !usual {
@@ -211,32 +218,78 @@ impl Side {
         }
         self.cruise -= 1;
         self.filtered = filtered;
+        self.lowest = if filtered < self.lowest { filtered } else { self.lowest };
         self.reading = torque;
         self.position = position;
         self.trace.add(position, torque);
-        self.profile.position += self.profile.speed;
+        self.profile.cruise_on();
+        true
+    }
+
+    /// The same for a cycle of a pressed motor that stands: the command stands too, and nothing is traced.
+    #[inline(always)]
+    fn quick_stand(&mut self, plan: &Plan, position: f64, torque: f64) -> bool {
+        let filtered = (1.0 - GAIN) * self.filtered + plan.torque_share * torque;
+        let usual = self.stand != 0
+            && (position - self.anchor).abs() <= self.stray
+            && filtered > plan.release
+            && filtered < plan.bound;
+        if !usual {
+            return false;
+        }
+        self.stand -= 1;
+        self.filtered = filtered;
+        self.reading = torque;
+        self.position = position;
         true
     }
 
     /// Cycles that went by in [`Side::quick`] since the last [`Side::look_ahead`].
+    #[inline(always)]
     #[must_use]
     pub fn quick_cycles(&self) -> u32 {
-        self.granted - self.cruise
+        self.granted - self.cruise - self.stand
     }
 
-    /// Counts the cycles for which [`Side::quick`] may go on, at most `left`.
+    /// Ends what [`Side::look_ahead`] has granted.
+    #[inline(always)]
+    pub fn look_no_further(&mut self) {
+        if self.held {
+            self.standing += self.quick_cycles();
+        }
+        (self.cruise, self.stand, self.granted) = (0, 0, 0);
+    }
+
+    /// Counts the cycles for which a pressed motor may stand on, at most `left`.
+    fn stand_on(&mut self, plan: &Plan, left: u32) {
+        // Within this way all bounds of [`Side::safe`] hold, and the motor stands.
+        let lag = (self.profile.position - self.anchor).abs();
+        let end = plan.distance[1] - plan.sense * (self.anchor - self.start);
+        self.stray = lower(lower(plan.standing_way, 0.5 * plan.jump), lower(plan.lag_limit - lag, end));
+        self.frozen = 0;
+        self.granted = plan.detection.saturating_sub(self.standing + 1).min(left);
+        self.stand = self.granted;
+    }
+
+    /// Counts the cycles for which [`Side::quick`] may go on, at most `left`; after a cycle's step of the command.
+    #[inline(always)]
     pub fn look_ahead(&mut self, plan: &Plan, left: u32) {
+        if self.held && self.standing >= plan.hold {
+            return self.stand_on(plan, left);
+        }
         let p = &self.profile;
-        (self.cruise, self.granted) = (0, 0);
         if !p.cruises() || self.held || self.frozen > 0 {
             return;
         }
+        // Between two lags of the band the position changes by no more than a jump.
+        self.usual_lag = p.position - p.speed - self.position;
+        self.lag_band = lower(0.5 * (plan.jump - p.speed.abs()), plan.lag_limit - self.usual_lag.abs());
         // The command brakes over v·(v + a)/(2a), and the axis may lead it by the largest lag.
         let (way, speed) = (p.left().abs(), p.speed.abs());
         let braking = speed * (speed + plan.acceleration) / (2.0 * plan.acceleration) + 4.0 * speed;
         let to_end = plan.distance[1] - plan.lag_limit - plan.sense * (p.position - self.start);
-        let free = if p.speed * plan.sense > 0.0 { to_end.min(way - braking) } else { way - braking };
-        self.granted = ((free / speed).max(0.0) as u32).min(left);
+        let free = if p.speed * plan.sense > 0.0 { lower(to_end, way - braking) } else { way - braking };
+        self.granted = ((free / speed) as u32).min(left);
         self.cruise = self.granted;
     }
 
@@ -295,10 +348,11 @@ impl Side {
         if self.standing >= plan.detection { Touch::Pressed } else { Touch::Held }
     }
 
-    /// Begins a move to `goal` and returns the cycles that it takes at most.
+    /// Begins a move to `goal` and returns the cycles that it takes at most. The trace stays that of the touch before.
     pub fn go(&mut self, plan: &Plan, goal: f64, speed: f64) -> f64 {
+        self.trace.pause();
         self.profile.go(goal, speed);
-        self.trip = plan.threshold;
+        self.trip = plan.bound;
         self.held = false;
         self.lowest = self.filtered;
         self.from = self.position;
@@ -310,7 +364,7 @@ impl Side {
     /// One cycle of a move, after [`Side::sense`]: arrived, going, or broken.
     #[inline(always)]
     pub fn follow(&mut self, plan: &Plan) -> Touch {
-        self.lowest = self.lowest.min(self.filtered);
+        self.lowest = lower(self.lowest, self.filtered);
         if self.frozen > 0 && self.profile.speed != 0.0 && self.rigid(plan) {
             return Touch::Broken;
         }

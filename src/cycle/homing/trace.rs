@@ -11,6 +11,8 @@ pub struct Trace {
     /// Share of a sample in its block's mean.
     share: f64,
     length: u32,
+    /// Cycles after which a block is full: `length`, or never while paused.
+    full: u32,
     in_block: u32,
     position: f64,
     torque: f64,
@@ -27,6 +29,7 @@ impl Default for Trace {
             written: 0,
             share: 1.0,
             length: 1,
+            full: u32::MAX,
             in_block: 0,
             position: 0.0,
             torque: 0.0,
@@ -44,6 +47,7 @@ impl Trace {
     pub fn start(&mut self, length: u32, origin: f64, sense: f64, torque_sense: f64) {
         (self.origin, self.sense, self.torque_sense) = (origin, sense, torque_sense);
         self.length = length.max(1);
+        self.full = self.length;
         self.share = 1.0 / f64::from(self.length);
         self.written = 0;
         self.in_block = 0;
@@ -51,16 +55,22 @@ impl Trace {
         self.torque = 0.0;
     }
 
+    /// Keeps what is there until the next start, whatever is added.
+    pub fn pause(&mut self) {
+        self.full = u32::MAX;
+        self.in_block = 0;
+    }
+
     /// Adds the position (mm) and torque of a cycle, as they were read.
     #[inline(always)]
     pub fn add(&mut self, position: f64, torque: f64) {
-        if self.length == 1 {
+        if self.full == 1 {
             return self.put(position, torque);
         }
         self.position += position;
         self.torque += torque;
         self.in_block += 1;
-        if self.in_block >= self.length {
+        if self.in_block >= self.full {
             self.put(self.position * self.share, self.torque * self.share);
             self.in_block = 0;
             self.position = 0.0;
@@ -105,6 +115,12 @@ impl Trace {
         self.written == 0
     }
 
+    /// Way at the last block, mm; 0 before the first.
+    #[must_use]
+    pub fn last_way(&self) -> f64 {
+        if self.is_empty() { 0.0 } else { self.block(self.len().wrapping_sub(1)).0 }
+    }
+
     /// Way (mm) and torque of block `i`, 0 is the oldest held; any `i` is safe to ask for.
     #[must_use]
     #[inline(always)]
@@ -130,5 +146,8 @@ mod tests {
         assert_eq!((trace.len(), trace.block(0)), (BLOCKS as u32, (3.0, 1.0)));
         assert_eq!(trace.block(BLOCKS as u32 - 1), ((BLOCKS + 2) as f64, 1.0));
         assert!(trace.stuck(100) && !Trace::default().stuck(100));
+        trace.pause();
+        (0..10).for_each(|_| trace.add(0.0, 1.0));
+        assert_eq!(trace.block(BLOCKS as u32 - 1), ((BLOCKS + 2) as f64, 1.0));
     }
 }

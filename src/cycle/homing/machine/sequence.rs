@@ -15,9 +15,8 @@ impl Homing {
                 }
             }
             Phase::Retract => {
-                let back = self.follow();
-                if self.phase == Phase::Retract && self.fitted() && back {
-                    self.retracted();
+                if self.follow() {
+                    self.enter_evaluate();
                 }
             }
             Phase::Clear => {
@@ -28,7 +27,7 @@ impl Homing {
             }
             Phase::Evaluate => {
                 if self.fitted() {
-                    self.conclude();
+                    self.evaluated();
                 }
             }
             Phase::Offset => {
@@ -153,14 +152,9 @@ impl Homing {
         let side = &self.sides[i];
         let offset = self.plan.sense * (side.origin - side.start);
         if let Err(fault) = self.touches[i].add(&self.plan, self.touch, &self.fit, offset) {
-            // On the way back it may still show that a tight spot is to blame.
-            if self.phase != Phase::Retract {
-                return self.leave(fault);
-            }
             self.suspect = if self.suspect == Fault::NONE { fault } else { self.suspect };
         }
         self.fitting += 1;
-        self.quick = self.plan.motors == 1;
         if self.fitting < self.plan.motors {
             self.evaluate(self.fitting);
         }
@@ -169,9 +163,37 @@ impl Homing {
     /// Begins the evaluation of a motor's last touch.
     fn evaluate(&mut self, motor: usize) {
         self.fitting = motor;
-        let side = &self.sides[motor & 1];
-        let way = self.plan.sense * (side.position - side.origin);
-        self.fit.start(way - self.plan.window(), self.plan.window(), self.plan.threshold);
+        let window = self.plan.window();
+        self.fit.start(self.sides[motor & 1].trace.last_way() - window, window, self.plan.threshold);
+    }
+
+    /// Standing: evaluates the touch of every motor.
+    #[cold]
+    fn enter_evaluate(&mut self) {
+        self.evaluate(0);
+        self.enter(Phase::Evaluate, 2.0 * f64::from(Fit::slices_bound()));
+    }
+
+    /// The touch is evaluated. Back from it: was it a stop, which pushes the axis back, or a tight spot, which holds it
+    /// both ways? That explains more than what the evaluation found.
+    #[cold]
+    fn evaluated(&mut self) {
+        let plan = self.plan;
+        let back = self.touch < plan.touches;
+        for (side, touches) in self.sides.iter().zip(&self.touches).take(plan.motors) {
+            if let (true, Some(fault)) = (back, side.held_back(&plan, touches.level())) {
+                return self.leave(fault);
+            }
+        }
+        if self.suspect != Fault::NONE {
+            return self.leave(self.suspect);
+        }
+        if back {
+            self.touch += 1;
+            self.start_touch();
+        } else {
+            self.conclude();
+        }
     }
 
     #[cold]
@@ -258,13 +280,12 @@ impl Homing {
             }
             self.event(GIB_HOMING_EVENT_LIMITING);
         }
-        self.evaluate(0);
         if self.touch < plan.touches {
             let mut bound = 0f64;
             for side in self.sides.iter_mut().take(plan.motors) {
                 bound = bound.max(side.go(&plan, side.position - plan.sense * plan.retract, plan.approach));
             }
-            return self.enter(Phase::Retract, bound + 2.0 * f64::from(Fit::slices_bound()));
+            return self.enter(Phase::Retract, bound);
         }
         // The command and the request to drop the undone way come in one cycle: to the kernel it is no motion.
         self.sides.iter_mut().take(plan.motors).for_each(|side| side.clear_lag(&plan));
@@ -277,35 +298,16 @@ impl Homing {
         }
     }
 
-    /// Back from a touch: was it a stop, which pushes the axis back, or a tight spot, which holds it both ways?
-    #[cold]
-    fn retracted(&mut self) {
-        let plan = self.plan;
-        for (side, touches) in self.sides.iter().zip(&self.touches).take(plan.motors) {
-            if let Some(fault) = side.held_back(&plan, touches.level()) {
-                return self.leave(fault);
-            }
-        }
-        if self.suspect != Fault::NONE {
-            return self.leave(self.suspect);
-        }
-        self.touch += 1;
-        self.start_touch();
-    }
-
     /// The undone way is dropped: the command is where the axis is.
     #[cold]
     fn cleared(&mut self) {
         self.event(GIB_HOMING_EVENT_CLEARED);
-        self.enter(Phase::Evaluate, 2.0 * f64::from(Fit::slices_bound()));
+        self.enter_evaluate();
     }
 
     /// All touches are evaluated: do they agree, and where is home?
     #[cold]
     fn conclude(&mut self) {
-        if self.phase != Phase::Evaluate {
-            return; // left meanwhile
-        }
         let plan = self.plan;
         for i in 0..plan.motors.min(2) {
             if let Err(fault) = self.touches[i].agree(&plan) {
@@ -341,7 +343,7 @@ impl Homing {
             return; // on the way out already
         }
         self.now = self.cycles(); // an abort comes between two cycles
-        self.sides.iter_mut().for_each(|side| side.look_ahead(&self.plan, 0));
+        self.sides[0].look_no_further();
         self.fault = fault;
         self.output.message = fault.code;
         // Without a position to trust no move is safe; a faulted drive makes none.
@@ -425,7 +427,7 @@ impl Homing {
     pub(super) fn enter(&mut self, phase: Phase, cycles: f64) {
         self.phase = phase;
         self.quick = self.plan.motors == 1
-            && (matches!(phase, Phase::Touch | Phase::Offset) || (phase == Phase::Retract && self.fitting > 0));
+            && matches!(phase, Phase::Touch | Phase::Retract | Phase::Offset);
         let out = matches!(phase, Phase::Stopping | Phase::Unload | Phase::Relieve | Phase::Restore);
         let last = if out { u32::MAX } else { self.end };
         self.deadline = self.now.saturating_add((cycles + 1.0) as u32).min(last);
