@@ -549,7 +549,7 @@
 #define GIB_HOMING_CLEAR 4
 
 /**
- * Stands while the last touch is evaluated in slices.
+ * Stands while a touch is evaluated in slices.
  */
 #define GIB_HOMING_EVALUATE 5
 

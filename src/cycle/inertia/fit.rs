@@ -94,7 +94,6 @@ const PARABOLA: f64 = 1.2;
 ///
 /// # Errors
 /// In the second place: `GIB_ERR_INERTIA_FEW`, `GIB_ERR_INERTIA_EXCITATION`, `GIB_ERR_INERTIA_SIGN`.
-#[must_use]
 pub fn fit(blocks: &[Block], length: u32, question: &Question) -> (Balance, Result<(), Fault>) {
     let mut balance = Balance { both_ways: both_ways(blocks), naive: naive(blocks), ..Balance::default() };
     if blocks.len() < FEWEST {

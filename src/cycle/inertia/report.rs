@@ -66,13 +66,12 @@ impl InertiaReport {
     ///
     /// # Errors
     /// In the second place why the value cannot be used; the report then holds what is known all the same.
-    #[must_use]
     pub fn of(blocks: &[Block], length: u32, question: &Question) -> (InertiaReport, Result<(), Fault>) {
         let (balance, verdict) = fit(blocks, length, question);
         let (own, total) = (question.own[0], balance.inertia.value);
         let fault =
             Fault { code: GIB_ERR_INERTIA_OWN, field: "own_inertia_kg_m2\0", value: own, low: 0.0, high: total };
-        let verdict = verdict.and_then(|()| if own < total { Ok(()) } else { Err(fault) });
+        let verdict = verdict.and(if own < total { Ok(()) } else { Err(fault) });
         (InertiaReport::new(question, &balance, verdict), verdict)
     }
 
