@@ -283,7 +283,7 @@ fn ramp(rows: &Rows, balance: &Balance, length: u32, question: &Question) -> Ram
     let friction = (balance.coulomb.value + balance.viscous.value * top).max(0.0);
     let strongest = quantile(rows.blocks, 0.98, |b| b.torque.abs()).min(rows.torque_limit);
     let fastest = ((strongest - friction) / inertia).max(seen);
-    let acceleration = (needed / TIMES).clamp(0.25 * seen, fastest);
+    let acceleration = (needed / TIMES).max(0.25 * seen).min(fastest);
     let times = (needed / acceleration).ceil().max(TIMES);
     Ramp { speeds: [top - span, top], acceleration, times, torque: friction + inertia * acceleration }
 }

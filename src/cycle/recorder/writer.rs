@@ -74,13 +74,16 @@ pub fn step(plan: &Plan, state: &mut State, ring: &[AtomicU64], values: &[f64]) 
 
 /// Four at a time: the compiler does not unroll atomic stores by itself.
 #[inline(always)]
-fn copy(cells: &[AtomicU64], values: &[f64]) {
-    let put = |(cell, value): (&AtomicU64, &f64)| cell.store(value.to_bits(), Ordering::Relaxed);
-    let (cells, values) = (cells.chunks_exact(4), values.chunks_exact(4));
-    cells.remainder().iter().zip(values.remainder()).for_each(put);
-    for (cells, values) in cells.zip(values) {
-        cells.iter().zip(values).for_each(put);
+fn copy(mut cells: &[AtomicU64], mut values: &[f64]) {
+    let put = |cell: &AtomicU64, value: f64| cell.store(value.to_bits(), Ordering::Relaxed);
+    while let ([a, b, c, d, cells_left @ ..], [p, q, r, s, values_left @ ..]) = (cells, values) {
+        put(a, *p);
+        put(b, *q);
+        put(c, *r);
+        put(d, *s);
+        (cells, values) = (cells_left, values_left);
     }
+    cells.iter().zip(values).for_each(|(cell, value)| put(cell, *value));
 }
 
 /// Tells the readers that no row will come any more.

@@ -309,7 +309,7 @@ impl SpeedVariation {
     fn go_back(&mut self) {
         let missing = self.mean - self.speed;
         let most = self.rate.max(1e-6 * self.mean);
-        self.go(missing.clamp(-most, most));
+        self.go(missing.max(-most).min(most));
         if (self.mean - self.speed).abs() <= 1e-9 * self.mean {
             self.output.torque_nm = 0.0;
             self.enter(if self.fault == Fault::NONE { Phase::Done } else { Phase::Failed });
