@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use gib::diagnosis::{Diagnosis, Verdict, diagnose};
+use gib::machine::Drive;
 use gib::recording::Recording;
 
 use super::table::Table;
@@ -152,13 +153,17 @@ fn text(d: &Diagnosis) -> String {
         text.push('\n');
     }
     for gain in &d.gains {
-        let unit = if gain.channel.ends_with("position") { "mm" } else { unit };
+        let (factor, unit) = match (gain.channel.ends_with("position"), &d.extended.drive) {
+            (false, _) => (1.0, unit),
+            (true, Drive::Rotary { .. }) => (1.0, "°"),
+            (true, _) => (1e3, "µm"),
+        };
         let _ = writeln!(
             text,
             "{} error on rows not fitted: {:.4} → {:.4} {unit} RMS, {:.2} times better (95 %: {:.2} to {:.2})",
             gain.channel,
-            gain.before,
-            gain.after,
+            factor * gain.before,
+            factor * gain.after,
             gain.before / gain.after.max(1e-300),
             gain.ci95[0],
             gain.ci95[1]
