@@ -139,6 +139,31 @@ pub const GIB_ERR_RECORDER_FOREIGN: i32 = -1001;
 pub const GIB_ERR_RECORDER_COLUMN: i32 = -1002;
 /// A step gave another number of values than there are channels; no row was written.
 pub const GIB_ERR_RECORDER_COUNT: i32 = -1003;
+/// The seat's or the bearing's acceleration is no number; the plain scale is in force.
+pub const GIB_ERR_VIBRATION_NOT_A_NUMBER: i32 = -600;
+/// An acceleration is stuck; the plain scale is in force.
+pub const GIB_ERR_VIBRATION_STUCK: i32 = -601;
+/// An accelerometer is at its full scale; the plain scale is in force.
+pub const GIB_ERR_VIBRATION_SATURATED: i32 = -602;
+/// An acceleration or displacement is implausible; the plain scale is in force.
+pub const GIB_ERR_VIBRATION_IMPLAUSIBLE: i32 = -603;
+/// The spindle's angle is no number or jumps; the plain scale is in force.
+pub const GIB_ERR_VIBRATION_ANGLE: i32 = -604;
+
+/// At a frequency no amplitude that stroke and torque allow moves the machine above the noise of the sensors.
+pub const GIB_ERR_CALIBRATION_SIGNAL: i32 = -700;
+/// A sensor is stuck: its reading never changes while the axis swings.
+pub const GIB_ERR_CALIBRATION_STUCK: i32 = -701;
+/// An accelerometer or the ball bar is at its full scale.
+pub const GIB_ERR_CALIBRATION_SATURATED: i32 = -702;
+/// The two displacements are too near to opposite phase for the published formula.
+pub const GIB_ERR_CALIBRATION_CONDITION: i32 = -703;
+/// An experiment cannot be added: there are eight, or its frequencies are not those of the first.
+pub const GIB_ERR_CALIBRATION_ADD: i32 = -704;
+/// A gain is beyond 0.1 to 10: a sensor's unit or sign is wrong.
+pub const GIB_ERR_CALIBRATION_GAIN: i32 = -705;
+/// The relative displacement does not repeat: something else shakes the machine, or the ball bar is loose.
+pub const GIB_ERR_CALIBRATION_NOISE: i32 = -706;
 
 /// Every status and the sentence that explains it.
 const TEXTS: &[(i32, &str)] = &[
@@ -207,6 +232,18 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_RECORDER_FOREIGN, "the name belongs to shared memory that is no recorder's, or to another user\0"),
     (GIB_ERR_RECORDER_COLUMN, "the name of a column is misspelled, in a wrong unit, or stands twice\0"),
     (GIB_ERR_RECORDER_COUNT, "a step gave another number of values than there are channels\0"),
+    (GIB_ERR_VIBRATION_NOT_A_NUMBER, "an acceleration is no number; the plain scale is in force\0"),
+    (GIB_ERR_VIBRATION_STUCK, "an acceleration is stuck; the plain scale is in force\0"),
+    (GIB_ERR_VIBRATION_SATURATED, "an accelerometer is at its full scale; the plain scale is in force\0"),
+    (GIB_ERR_VIBRATION_IMPLAUSIBLE, "an acceleration or displacement is implausible; the plain scale is in force\0"),
+    (GIB_ERR_VIBRATION_ANGLE, "the spindle's angle is no number or jumps; the plain scale is in force\0"),
+    (GIB_ERR_CALIBRATION_SIGNAL, "no allowed amplitude moves the machine above the noise of its sensors\0"),
+    (GIB_ERR_CALIBRATION_STUCK, "a sensor's reading never changes while the axis swings\0"),
+    (GIB_ERR_CALIBRATION_SATURATED, "an accelerometer or the ball bar is at its full scale\0"),
+    (GIB_ERR_CALIBRATION_CONDITION, "the displacements are too near to opposite phase for the published formula\0"),
+    (GIB_ERR_CALIBRATION_ADD, "the experiment cannot be added: too many, or other frequencies\0"),
+    (GIB_ERR_CALIBRATION_GAIN, "a gain is beyond 0.1 to 10: a sensor's unit or sign is wrong\0"),
+    (GIB_ERR_CALIBRATION_NOISE, "the relative displacement does not repeat\0"),
 ];
 
 /// The text of a status, NUL-terminated and static; for an unknown number a text that says so.

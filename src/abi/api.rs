@@ -5,16 +5,21 @@
 //! signatures, and `tests/header.rs` fails when an exported function is not here.
 
 use super::backlash::*;
+use super::calibration::*;
 use super::homing::*;
 use super::inertia::*;
 use super::program::*;
 use super::recorder::*;
 use super::speed_variation::*;
 use super::types::GibErrorDetail;
+use super::vibration::*;
 use super::{GIB_ABI_VERSION, gib_abi_version, gib_status_text, gib_version};
 use crate::cycle::backlash::config::BacklashConfig;
 use crate::cycle::backlash::io::{BacklashInput, BacklashOutput};
 use crate::cycle::backlash::verdict::{BacklashComparison, BacklashReport};
+use crate::cycle::calibration::config::CalibrationConfig;
+use crate::cycle::calibration::io::{CalibrationInput, CalibrationOutput};
+use crate::cycle::calibration::table::CalibrationTable;
 use crate::cycle::homing::config::HomingConfig;
 use crate::cycle::homing::io::{HomingInput, HomingOutput};
 use crate::cycle::homing::verdict::HomingReport;
@@ -23,6 +28,8 @@ use crate::cycle::inertia::io::{InertiaInput, InertiaOutput};
 use crate::cycle::inertia::report::InertiaReport;
 use crate::cycle::speed_variation::config::{SpeedVariationConfig, SpeedVariationLimits};
 use crate::cycle::speed_variation::io::{SpeedVariationInput, SpeedVariationOutput};
+use crate::cycle::vibration::config::VibrationConfig;
+use crate::cycle::vibration::io::{VibrationInput, VibrationOutput, VibrationReport};
 use core::ffi::{c_char, c_void};
 
 /// All functions of the library, each named as in this header without its `gib_`.
@@ -197,6 +204,61 @@ pub struct GibApiTable {
     pub recorder_result: unsafe extern "C" fn(handle: *const GibRecorder, report: *mut GibRecorderReport) -> i32,
     /// See gib_recorder_last_error.
     pub recorder_last_error: unsafe extern "C" fn(handle: *const GibRecorder, detail: *mut GibErrorDetail) -> i32,
+
+    /// See gib_vibration_size.
+    pub vibration_size: extern "C" fn() -> usize,
+    /// See gib_vibration_init_in.
+    pub vibration_init_in: unsafe extern "C" fn(memory: *mut c_void, size: usize, out: *mut *mut GibVibration) -> i32,
+    /// See gib_vibration_new.
+    pub vibration_new: extern "C" fn() -> *mut GibVibration,
+    /// See gib_vibration_free.
+    pub vibration_free: unsafe extern "C" fn(handle: *mut GibVibration),
+    /// See gib_vibration_start.
+    pub vibration_start: unsafe extern "C" fn(
+        handle: *mut GibVibration,
+        config: *const VibrationConfig,
+        table: *const CalibrationTable,
+    ) -> i32,
+    /// See gib_vibration_step.
+    pub vibration_step: unsafe extern "C" fn(
+        handle: *mut GibVibration,
+        input: *const VibrationInput,
+        output: *mut VibrationOutput,
+    ) -> i32,
+    /// See gib_vibration_abort.
+    pub vibration_abort: unsafe extern "C" fn(handle: *mut GibVibration) -> i32,
+    /// See gib_vibration_result.
+    pub vibration_result: unsafe extern "C" fn(handle: *const GibVibration, report: *mut VibrationReport) -> i32,
+    /// See gib_vibration_last_error.
+    pub vibration_last_error: unsafe extern "C" fn(handle: *const GibVibration, detail: *mut GibErrorDetail) -> i32,
+
+    /// See gib_calibration_size.
+    pub calibration_size: extern "C" fn() -> usize,
+    /// See gib_calibration_init_in.
+    pub calibration_init_in:
+        unsafe extern "C" fn(memory: *mut c_void, size: usize, out: *mut *mut GibCalibration) -> i32,
+    /// See gib_calibration_new.
+    pub calibration_new: extern "C" fn() -> *mut GibCalibration,
+    /// See gib_calibration_free.
+    pub calibration_free: unsafe extern "C" fn(handle: *mut GibCalibration),
+    /// See gib_calibration_start.
+    pub calibration_start: unsafe extern "C" fn(handle: *mut GibCalibration, config: *const CalibrationConfig) -> i32,
+    /// See gib_calibration_step.
+    pub calibration_step: unsafe extern "C" fn(
+        handle: *mut GibCalibration,
+        input: *const CalibrationInput,
+        output: *mut CalibrationOutput,
+    ) -> i32,
+    /// See gib_calibration_abort.
+    pub calibration_abort: unsafe extern "C" fn(handle: *mut GibCalibration) -> i32,
+    /// See gib_calibration_result.
+    pub calibration_result: unsafe extern "C" fn(handle: *const GibCalibration, table: *mut CalibrationTable) -> i32,
+    /// See gib_calibration_save.
+    pub calibration_save: unsafe extern "C" fn(handle: *mut GibCalibration, path: *const c_char) -> i32,
+    /// See gib_calibration_load.
+    pub calibration_load: unsafe extern "C" fn(handle: *mut GibCalibration, path: *const c_char) -> i32,
+    /// See gib_calibration_last_error.
+    pub calibration_last_error: unsafe extern "C" fn(handle: *const GibCalibration, detail: *mut GibErrorDetail) -> i32,
 }
 
 static API: GibApiTable = GibApiTable {
@@ -271,6 +333,28 @@ static API: GibApiTable = GibApiTable {
     recorder_close: gib_recorder_close,
     recorder_result: gib_recorder_result,
     recorder_last_error: gib_recorder_last_error,
+
+    vibration_size: gib_vibration_size,
+    vibration_init_in: gib_vibration_init_in,
+    vibration_new: gib_vibration_new,
+    vibration_free: gib_vibration_free,
+    vibration_start: gib_vibration_start,
+    vibration_step: gib_vibration_step,
+    vibration_abort: gib_vibration_abort,
+    vibration_result: gib_vibration_result,
+    vibration_last_error: gib_vibration_last_error,
+
+    calibration_size: gib_calibration_size,
+    calibration_init_in: gib_calibration_init_in,
+    calibration_new: gib_calibration_new,
+    calibration_free: gib_calibration_free,
+    calibration_start: gib_calibration_start,
+    calibration_step: gib_calibration_step,
+    calibration_abort: gib_calibration_abort,
+    calibration_result: gib_calibration_result,
+    calibration_save: gib_calibration_save,
+    calibration_load: gib_calibration_load,
+    calibration_last_error: gib_calibration_last_error,
 };
 
 /// The table of all functions, so that `dlsym` needs one name: "gib_api".

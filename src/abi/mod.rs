@@ -7,6 +7,7 @@
 
 pub mod api;
 pub mod backlash;
+pub mod calibration;
 pub mod guard;
 pub mod homing;
 pub mod inertia;
@@ -15,6 +16,7 @@ pub mod recorder;
 pub mod shared_memory;
 pub mod speed_variation;
 pub mod types;
+pub mod vibration;
 
 use crate::error::status_text;
 use core::ffi::c_char;

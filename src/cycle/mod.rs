@@ -5,9 +5,12 @@
 //! locks, reads a clock or can panic.
 
 pub mod backlash;
+pub mod calibration;
 pub mod homing;
 pub mod inertia;
 pub mod level;
 pub mod profile;
 pub mod recorder;
 pub mod speed_variation;
+pub mod turns;
+pub mod vibration;

@@ -7,6 +7,7 @@
 //! Each [`Effect`] adds to it or replaces one of its values; [`Axis::belief`] is the base file with the replacements
 //! done. Load units are mm, on a rotary axis degrees.
 
+pub mod calibration;
 mod cause;
 mod read;
 mod two_masses;
