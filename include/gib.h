@@ -384,6 +384,61 @@
 #define GIB_ERR_RECORDER_COUNT (-1003)
 
 /**
+ * The seat's or the bearing's acceleration is no number; the plain scale is in force.
+ */
+#define GIB_ERR_VIBRATION_NOT_A_NUMBER (-600)
+
+/**
+ * An acceleration is stuck; the plain scale is in force.
+ */
+#define GIB_ERR_VIBRATION_STUCK (-601)
+
+/**
+ * An accelerometer is at its full scale; the plain scale is in force.
+ */
+#define GIB_ERR_VIBRATION_SATURATED (-602)
+
+/**
+ * An acceleration or displacement is implausible; the plain scale is in force.
+ */
+#define GIB_ERR_VIBRATION_IMPLAUSIBLE (-603)
+
+/**
+ * The spindle's angle is no number or jumps; the plain scale is in force.
+ */
+#define GIB_ERR_VIBRATION_ANGLE (-604)
+
+/**
+ * At a frequency no amplitude that stroke and torque allow moves the machine above the noise of the sensors.
+ */
+#define GIB_ERR_CALIBRATION_SIGNAL (-700)
+
+/**
+ * A sensor is stuck: its reading never changes while the axis swings.
+ */
+#define GIB_ERR_CALIBRATION_STUCK (-701)
+
+/**
+ * An accelerometer or the ball bar is at its full scale.
+ */
+#define GIB_ERR_CALIBRATION_SATURATED (-702)
+
+/**
+ * The two displacements are too near to opposite phase for the published formula.
+ */
+#define GIB_ERR_CALIBRATION_CONDITION (-703)
+
+/**
+ * An experiment cannot be added: there are eight, or its frequencies are not those of the first.
+ */
+#define GIB_ERR_CALIBRATION_ADD (-704)
+
+/**
+ * A gain is beyond 0.1 to 10: a sensor's unit or sign is wrong.
+ */
+#define GIB_ERR_CALIBRATION_GAIN (-705)
+
+/**
  * Slow-feed mode (default): the motor is fed slowly and the torque read in every cycle. The more accurate one.
  */
 #define GIB_BACKLASH_SLOW_FEED 0
@@ -492,6 +547,66 @@
  * Input flag: abort, as `gib_backlash_abort` does.
  */
 #define GIB_INPUT_ABORT 2
+
+/**
+ * Complex gains by least squares over all experiments (default).
+ */
+#define GIB_CALIBRATION_LEAST_SQUARES 0
+
+/**
+ * Gains from the last experiment alone, as published, with the signs put right; phases stay 0.
+ */
+#define GIB_CALIBRATION_PUBLISHED 1
+
+/**
+ * Nothing is asked for.
+ */
+#define GIB_CALIBRATION_IDLE 0
+
+/**
+ * The amplitude rises.
+ */
+#define GIB_CALIBRATION_RISE 1
+
+/**
+ * Torque and signals are looked at, to find the largest amplitude allowed.
+ */
+#define GIB_CALIBRATION_PROBE 2
+
+/**
+ * Amplitude and phase are measured.
+ */
+#define GIB_CALIBRATION_MEASURE 3
+
+/**
+ * The amplitude falls, before the next frequency.
+ */
+#define GIB_CALIBRATION_FALL 4
+
+/**
+ * The axis stands at its start while the gains are computed, a frequency a cycle.
+ */
+#define GIB_CALIBRATION_EVALUATE 5
+
+/**
+ * The amplitude falls, to end with an error.
+ */
+#define GIB_CALIBRATION_STOPPING 6
+
+/**
+ * Ended well.
+ */
+#define GIB_CALIBRATION_DONE 7
+
+/**
+ * Ended with an error; kept until the next start.
+ */
+#define GIB_CALIBRATION_FAILED 8
+
+/**
+ * Most frequencies in a calibration.
+ */
+#define GIB_CALIBRATION_POINTS 32
 
 /**
  * Home position from the start of the torque–position line (default).
@@ -765,6 +880,96 @@
 #define GIB_SPEED_VARIATION_STOP 8
 
 /**
+ * Harmonics of the spindle's turn, each divided by −ω² (default).
+ */
+#define GIB_VIBRATION_HARMONIC 0
+
+/**
+ * Integrated twice, closed once a revolution, as published.
+ */
+#define GIB_VIBRATION_INTEGRATE 1
+
+/**
+ * Most harmonics that are tracked.
+ */
+#define GIB_VIBRATION_HARMONICS 16
+
+/**
+ * The accelerometer on the seat, the fixed part of the tool slide.
+ */
+#define GIB_VIBRATION_SEAT 0
+
+/**
+ * The accelerometer on the spindle bearing.
+ */
+#define GIB_VIBRATION_BEARING 1
+
+/**
+ * Not started: the position is the plain scale.
+ */
+#define GIB_VIBRATION_IDLE 0
+
+/**
+ * No whole revolution yet, or no rotation: the correction is absent or on its way out.
+ */
+#define GIB_VIBRATION_WAITING 1
+
+/**
+ * The position is corrected; `blend_ratio` says whether fully.
+ */
+#define GIB_VIBRATION_CORRECTING 2
+
+/**
+ * A sensor is bad: the correction fades to the plain scale, and comes back after a good revolution.
+ */
+#define GIB_VIBRATION_DEGRADED 3
+
+/**
+ * Aborted: the correction fades out.
+ */
+#define GIB_VIBRATION_STOPPING 4
+
+/**
+ * Ended with an error; the position is the plain scale until the next start.
+ */
+#define GIB_VIBRATION_FAILED 5
+
+/**
+ * Reason: no whole revolution since the start or since the last fault.
+ */
+#define GIB_VIBRATION_NO_REVOLUTION 1
+
+/**
+ * Reason: the spindle does not turn, or too slowly.
+ */
+#define GIB_VIBRATION_NO_ROTATION 2
+
+/**
+ * Reason: the spindle's angle is no number or jumps.
+ */
+#define GIB_VIBRATION_BAD_ANGLE 4
+
+/**
+ * Reason: the seat's acceleration is no number. The bearing's is this, shifted left by 8; so for all below.
+ */
+#define GIB_VIBRATION_NOT_A_NUMBER 65536
+
+/**
+ * Reason: the acceleration is stuck: the same to the last digit for a quarter of a revolution.
+ */
+#define GIB_VIBRATION_STUCK 131072
+
+/**
+ * Reason: the acceleration is at its full scale.
+ */
+#define GIB_VIBRATION_SATURATED 262144
+
+/**
+ * Reason: acceleration or displacement beyond the largest plausible one.
+ */
+#define GIB_VIBRATION_IMPLAUSIBLE 524288
+
+/**
  * Version of this interface: major · 65536 + minor.
  *
  * Within one major, functions, struct tails and status numbers are added and nothing is changed or taken away;
@@ -803,6 +1008,11 @@
 typedef struct gib_backlash gib_backlash;
 
 /**
+ * A calibration of two accelerometers. Opaque; its size is `gib_calibration_size()`.
+ */
+typedef struct gib_calibration gib_calibration;
+
+/**
  * Homing of one axis, of one motor or two. Opaque; its size is `gib_homing_size()`.
  */
 typedef struct gib_homing gib_homing;
@@ -826,6 +1036,11 @@ typedef struct gib_recorder gib_recorder;
  * A speed variation of one spindle. Opaque; its size is `gib_speed_variation_size()`.
  */
 typedef struct gib_speed_variation gib_speed_variation;
+
+/**
+ * The corrected position of one tool slide. Opaque; its size is `gib_vibration_size()`.
+ */
+typedef struct gib_vibration gib_vibration;
 
 /**
  * What to measure and within which bounds. Zero in a field means its default; fields marked "required" have none.
@@ -1212,6 +1427,240 @@ typedef struct gib_error_detail {
      */
     double high;
 } gib_error_detail;
+
+/**
+ * How to calibrate. Zero in a field means its default; fields marked "required" have none.
+ *
+ * The axis swings about the place where it stands. Torque fields are in N·m whatever `torque_unit` says.
+ */
+typedef struct gib_calibration_config {
+    /**
+     * Size of this struct as the caller knows it: `sizeof(gib_calibration_config)`. Required.
+     */
+    uint32_t struct_size;
+    /**
+     * `GIB_CALIBRATION_LEAST_SQUARES` (default) or `GIB_CALIBRATION_PUBLISHED`.
+     */
+    int32_t method;
+    /**
+     * 1: one more experiment, at the same frequencies, beside those that this instance holds. 0 (default): the first.
+     */
+    int32_t add;
+    /**
+     * Frequencies in the list, 1 to 32. Required.
+     */
+    int32_t frequencies;
+    /**
+     * Unit of the torque input: `GIB_TORQUE_NM` (default) or `GIB_TORQUE_PERMILLE` of `rated_torque_nm`.
+     */
+    int32_t torque_unit;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
+    /**
+     * The frequencies, rising, 0.5 Hz to a tenth of the cycle frequency. Each is moved by less than half a percent, so
+     * that whole periods take whole cycles. Required.
+     */
+    double frequency_hz[GIB_CALIBRATION_POINTS];
+    /**
+     * Servo period, 0.00005 to 0.02 s. Required.
+     */
+    double cycle_s;
+    /**
+     * Largest amplitude, 0.001 to 1000 mm to either side. Required.
+     */
+    double stroke_mm;
+    /**
+     * Largest speed, 0.1 to 10000 mm/s (default 100).
+     */
+    double speed_mm_s;
+    /**
+     * Largest acceleration, 1 to 1000000 mm/s² (default 5000).
+     */
+    double acceleration_mm_s2;
+    /**
+     * Torque that must never be exceeded, N·m. Required.
+     */
+    double torque_bound_nm;
+    /**
+     * Part of it that the amplitude is chosen for, 0.05 to 0.9 (default 0.6).
+     */
+    double torque_share_ratio;
+    /**
+     * Rated torque, N·m. Required for `GIB_TORQUE_PERMILLE`.
+     */
+    double rated_torque_nm;
+    /**
+     * Full scale of the accelerometers, 0.1 to 10000 m/s². Required.
+     */
+    double acceleration_range_m_s2;
+    /**
+     * Full scale of the ball bar, 1 to 1000000 µm (default 1000).
+     */
+    double ball_bar_range_um;
+    /**
+     * What the accelerometers' makers promise of their gain, 0.001 to 1 (default 0.1).
+     */
+    double tolerance_ratio;
+    /**
+     * Time of measuring at each frequency, 0.1 to 1000 s (default 4), rounded up to 32 periods at least.
+     */
+    double measure_s;
+    /**
+     * Time in which the amplitude goes up or down, 0.01 to 10 s (default 0.5), five periods at least.
+     */
+    double ramp_s;
+    /**
+     * Largest |target - position|, up to 100 mm (default the stroke).
+     */
+    double lag_limit_mm;
+} gib_calibration_config;
+/**
+ * Size of the struct in the first published ABI.
+ */
+#define gib_calibration_config_FIRST_SIZE 384
+
+/**
+ * What the kernel tells gib in a cycle, all of the same instant.
+ */
+typedef struct gib_calibration_input {
+    /**
+     * Position of the driven axis, mm.
+     */
+    double position_mm;
+    /**
+     * Its motor torque, in the unit of the configuration.
+     */
+    double torque;
+    /**
+     * Ball bar between the accelerometers, seat minus bearing, µm.
+     */
+    double ball_bar_um;
+    /**
+     * Acceleration of seat and bearing, m/s².
+     */
+    double acceleration_m_s2[2];
+    /**
+     * `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`; other bits must be 0.
+     */
+    uint32_t flags;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+} gib_calibration_input;
+
+/**
+ * What gib asks of the kernel in a cycle. Always written, and safe, also when the call returns an error.
+ */
+typedef struct gib_calibration_output {
+    /**
+     * Commanded position, mm. To be followed while `owns_motion` is 1.
+     */
+    double target_position_mm;
+    /**
+     * Commanded speed, mm/s, signed.
+     */
+    double target_speed_mm_s;
+    /**
+     * Present frequency, Hz.
+     */
+    double frequency_hz;
+    /**
+     * Present amplitude, mm.
+     */
+    double amplitude_mm;
+    /**
+     * What the step returned: `GIB_OK`, `GIB_BUSY`, `GIB_DONE` or the first error.
+     */
+    int32_t status;
+    /**
+     * One of the `GIB_CALIBRATION_…` phases.
+     */
+    int32_t phase;
+    /**
+     * 0, or the error to tell the operator about; its text is `gib_status_text`.
+     */
+    int32_t message;
+    /**
+     * 1 while gib commands the axis, else 0.
+     */
+    int32_t owns_motion;
+    /**
+     * 1: position or drive cannot be trusted; take the torque off the motor and brake it, until the next start.
+     */
+    int32_t stop_drive;
+    /**
+     * Present frequency in the list, counted from 0.
+     */
+    int32_t point;
+} gib_calibration_output;
+
+/**
+ * Both accelerometers at one frequency; arrays: seat, bearing.
+ */
+typedef struct gib_calibration_point {
+    /**
+     * Frequency, Hz.
+     */
+    double frequency_hz;
+    /**
+     * True displacement over the one from the accelerometer, 0.1 to 10.
+     */
+    double gain_ratio[2];
+    /**
+     * Phase of the true displacement ahead of the one from the accelerometer, -180 to 180 degrees.
+     */
+    double phase_deg[2];
+    /**
+     * Expanded uncertainty of the gain, k = 2.
+     */
+    double gain_uncertainty_ratio[2];
+    /**
+     * Expanded uncertainty of the phase, k = 2, degrees.
+     */
+    double phase_uncertainty_deg[2];
+    /**
+     * How much an error of the measured displacements is magnified in the gains: 1 is best; beyond 100 the two cannot be
+     * told apart and only their difference is known.
+     */
+    double condition_ratio;
+    /**
+     * What gains and phases leave of the measured relative displacement, root mean square, µm.
+     */
+    double residual_um;
+    /**
+     * Amplitude of the command in the last experiment, mm.
+     */
+    double amplitude_mm;
+    /**
+     * Experiments that the point rests on.
+     */
+    double experiments;
+} gib_calibration_point;
+
+/**
+ * A calibration: what to give to `gib_vibration_start`.
+ */
+typedef struct gib_calibration_table {
+    /**
+     * Size of this struct as the caller knows it: `sizeof(gib_calibration_table)`.
+     */
+    uint32_t struct_size;
+    /**
+     * Points that hold something, in order of rising frequency, 1 to 32.
+     */
+    uint32_t count;
+    /**
+     * The points.
+     */
+    struct gib_calibration_point point[GIB_CALIBRATION_POINTS];
+} gib_calibration_table;
+/**
+ * Size of the struct in the first published ABI.
+ */
+#define gib_calibration_table_FIRST_SIZE 3336
 
 /**
  * How to home. Zero in a field means its default; fields marked "required" have none.
@@ -2082,6 +2531,207 @@ typedef struct gib_speed_variation_limits {
 } gib_speed_variation_limits;
 
 /**
+ * How the position is to be corrected. Zero in a field means its default; fields marked "required" have none.
+ */
+typedef struct gib_vibration_config {
+    /**
+     * Size of this struct as the caller knows it: `sizeof(gib_vibration_config)`. Required.
+     */
+    uint32_t struct_size;
+    /**
+     * `GIB_VIBRATION_HARMONIC` (default) or `GIB_VIBRATION_INTEGRATE`.
+     */
+    int32_t method;
+    /**
+     * Harmonics of a revolution that are tracked, 1 to 16 (default 8). The workpiece's form and twice its corners should
+     * be among them. Those above 0.4 of the sampling frequency are left out while the spindle is that fast.
+     */
+    int32_t harmonics;
+    /**
+     * 1: a second slide (XM) carries the slide; its encoder is in the input. 0 (default): none.
+     */
+    int32_t second_slide;
+    /**
+     * Harmonic at which `GIB_VIBRATION_INTEGRATE` takes gain and phase of the calibration, 1 to 16 (default 1).
+     */
+    int32_t main_harmonic;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
+    /**
+     * Servo period, 0.00005 to 0.02 s. Required.
+     */
+    double cycle_s;
+    /**
+     * Full scale of the accelerometers, 0.1 to 10000 m/s²: a reading there is saturated. Required.
+     */
+    double acceleration_range_m_s2;
+    /**
+     * Largest plausible acceleration, up to the range (default).
+     */
+    double acceleration_max_m_s2;
+    /**
+     * Largest plausible displacement of seat or bearing, 0.1 to 10000 µm (default 100): more is a bad sensor.
+     */
+    double displacement_max_um;
+    /**
+     * Slowest speed at which the spindle counts as turning, 1 to 10000 rpm (default 30).
+     */
+    double speed_min_rpm;
+    /**
+     * Fastest speed that the spindle's encoder can show, up to a quarter turn a cycle (default 10000, or that).
+     */
+    double speed_max_rpm;
+    /**
+     * Lowest frequency at which an acceleration is worth a displacement, 0.1 to 1000 Hz (default 1).
+     */
+    double frequency_min_hz;
+    /**
+     * Revolutions over which the harmonics are averaged, 1 to 1000 (default 8).
+     */
+    double averaging_revolutions;
+    /**
+     * Time over which the correction comes and goes, 0.001 to 10 s (default 0.1).
+     */
+    double fade_s;
+    /**
+     * Time constant of the measured speed, one cycle to 1 s (default 0.02).
+     */
+    double speed_filter_s;
+} gib_vibration_config;
+/**
+ * Size of the struct in the first published ABI.
+ */
+#define gib_vibration_config_FIRST_SIZE 104
+
+/**
+ * What the kernel tells gib in a cycle, all of the same instant.
+ */
+typedef struct gib_vibration_input {
+    /**
+     * X linear scale: tool slide against its seat, mm.
+     */
+    double scale_mm;
+    /**
+     * Encoder of the second slide (XM), mm; only looked at with `second_slide`.
+     */
+    double second_slide_mm;
+    /**
+     * Spindle angle, degrees; wrapped anywhere or not at all.
+     */
+    double angle_deg;
+    /**
+     * Acceleration of seat and bearing, m/s², positive as the scale is.
+     */
+    double acceleration_m_s2[2];
+    /**
+     * `GIB_INPUT_ABORT`, `GIB_INPUT_FAULT`; other bits must be 0. Both fade the correction out.
+     */
+    uint32_t flags;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+} gib_vibration_input;
+
+/**
+ * What gib gives back in a cycle. Always written, and finite, also when the call returns an error.
+ */
+typedef struct gib_vibration_output {
+    /**
+     * Where the tool is against the workpiece: scale, second slide, and correction, mm.
+     */
+    double position_mm;
+    /**
+     * The correction that is in `position_mm`, µm.
+     */
+    double correction_um;
+    /**
+     * Displacement of seat and bearing, µm; the second slide's own motion is not in it.
+     */
+    double displacement_um[2];
+    /**
+     * Their difference, seat minus bearing, µm.
+     */
+    double relative_um;
+    /**
+     * Measured spindle speed, signed, rpm.
+     */
+    double speed_rpm;
+    /**
+     * How much of the relative displacement is in the position: 0, plain scale, to 1.
+     */
+    double blend_ratio;
+    /**
+     * What the step returned: `GIB_OK` idle, `GIB_BUSY`, or the first error.
+     */
+    int32_t status;
+    /**
+     * One of the `GIB_VIBRATION_…` phases.
+     */
+    int32_t phase;
+    /**
+     * 0, or the status to tell the operator about; its text is `gib_status_text`.
+     */
+    int32_t message;
+    /**
+     * Why the plain scale is in force, or on its way: a sum of `GIB_VIBRATION_…` reasons, 0 when the correction is.
+     */
+    uint32_t reasons;
+} gib_vibration_output;
+
+/**
+ * What is known of the vibration. Amplitudes are those of `A·cos(kθ − phase)`.
+ */
+typedef struct gib_vibration_report {
+    /**
+     * Amplitude of the relative displacement at each harmonic from 1 on, µm; method harmonic only.
+     */
+    double amplitude_um[GIB_VIBRATION_HARMONICS];
+    /**
+     * Its phase at spindle angle 0, degrees.
+     */
+    double phase_deg[GIB_VIBRATION_HARMONICS];
+    /**
+     * Offset of each accelerometer, m/s².
+     */
+    double offset_m_s2[2];
+    /**
+     * What the harmonics leave of each acceleration, standard deviation, m/s²; method harmonic only.
+     */
+    double noise_m_s2[2];
+    /**
+     * Measured spindle speed, signed, rpm.
+     */
+    double speed_rpm;
+    /**
+     * Revolutions since the last time that the correction had to begin anew.
+     */
+    double revolutions;
+    /**
+     * Cycles since the start that the spindle turned and a bad sensor kept the correction out.
+     */
+    uint64_t degraded_cycles;
+    /**
+     * Every reason since the start.
+     */
+    uint32_t reasons_seen;
+    /**
+     * `GIB_BUSY`, `GIB_OK` before a start, or the first error.
+     */
+    int32_t status;
+    /**
+     * `GIB_VIBRATION_HARMONIC` or `GIB_VIBRATION_INTEGRATE`.
+     */
+    int32_t method;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
+} gib_vibration_report;
+
+/**
  * All functions of the library, each named as in this header without its `gib_`.
  *
  * Get it from `gib_api`. A member whose offset is not below `struct_size` is not in this library.
@@ -2371,6 +3021,92 @@ typedef struct gib_api_table {
      * See gib_recorder_last_error.
      */
     int32_t (*recorder_last_error)(const struct gib_recorder *handle, struct gib_error_detail *detail);
+    /**
+     * See gib_vibration_size.
+     */
+    uintptr_t (*vibration_size)(void);
+    /**
+     * See gib_vibration_init_in.
+     */
+    int32_t (*vibration_init_in)(void *memory, uintptr_t size, struct gib_vibration **out);
+    /**
+     * See gib_vibration_new.
+     */
+    struct gib_vibration *(*vibration_new)(void);
+    /**
+     * See gib_vibration_free.
+     */
+    void (*vibration_free)(struct gib_vibration *handle);
+    /**
+     * See gib_vibration_start.
+     */
+    int32_t (*vibration_start)(struct gib_vibration *handle,
+                               const struct gib_vibration_config *config,
+                               const struct gib_calibration_table *table);
+    /**
+     * See gib_vibration_step.
+     */
+    int32_t (*vibration_step)(struct gib_vibration *handle,
+                              const struct gib_vibration_input *input,
+                              struct gib_vibration_output *output);
+    /**
+     * See gib_vibration_abort.
+     */
+    int32_t (*vibration_abort)(struct gib_vibration *handle);
+    /**
+     * See gib_vibration_result.
+     */
+    int32_t (*vibration_result)(const struct gib_vibration *handle, struct gib_vibration_report *report);
+    /**
+     * See gib_vibration_last_error.
+     */
+    int32_t (*vibration_last_error)(const struct gib_vibration *handle, struct gib_error_detail *detail);
+    /**
+     * See gib_calibration_size.
+     */
+    uintptr_t (*calibration_size)(void);
+    /**
+     * See gib_calibration_init_in.
+     */
+    int32_t (*calibration_init_in)(void *memory, uintptr_t size, struct gib_calibration **out);
+    /**
+     * See gib_calibration_new.
+     */
+    struct gib_calibration *(*calibration_new)(void);
+    /**
+     * See gib_calibration_free.
+     */
+    void (*calibration_free)(struct gib_calibration *handle);
+    /**
+     * See gib_calibration_start.
+     */
+    int32_t (*calibration_start)(struct gib_calibration *handle, const struct gib_calibration_config *config);
+    /**
+     * See gib_calibration_step.
+     */
+    int32_t (*calibration_step)(struct gib_calibration *handle,
+                                const struct gib_calibration_input *input,
+                                struct gib_calibration_output *output);
+    /**
+     * See gib_calibration_abort.
+     */
+    int32_t (*calibration_abort)(struct gib_calibration *handle);
+    /**
+     * See gib_calibration_result.
+     */
+    int32_t (*calibration_result)(const struct gib_calibration *handle, struct gib_calibration_table *table);
+    /**
+     * See gib_calibration_save.
+     */
+    int32_t (*calibration_save)(struct gib_calibration *handle, const char *path);
+    /**
+     * See gib_calibration_load.
+     */
+    int32_t (*calibration_load)(struct gib_calibration *handle, const char *path);
+    /**
+     * See gib_calibration_last_error.
+     */
+    int32_t (*calibration_last_error)(const struct gib_calibration *handle, struct gib_error_detail *detail);
 } gib_api_table;
 
 #ifdef __cplusplus
@@ -2613,6 +3349,168 @@ int32_t gib_backlash_compare(struct gib_backlash *handle,
  * `handle` is NULL or an instance; `detail` is NULL or writable.
  */
 int32_t gib_backlash_last_error(const struct gib_backlash *handle, struct gib_error_detail *detail);
+
+/**
+ * Bytes that an instance needs in memory of your own, to be aligned to 16.
+ *
+ * @return the size in bytes, about 30 KiB.
+ *
+ * [thread: any] [real-time: yes] [state: any]
+ */
+uintptr_t gib_calibration_size(void);
+
+/**
+ * Makes an idle instance in memory of your own. There is nothing to free; zero or reuse the memory when done.
+ *
+ * @param memory at least `gib_calibration_size()` bytes, aligned to 16; stays yours.
+ * @param size bytes at `memory`.
+ * @param out receives the handle; NULL on error.
+ * @return GIB_OK; GIB_ERR_NULL; GIB_ERR_MEMORY when too small or misaligned.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ *
+ * # Safety
+ * `memory` is NULL or points to `size` writable bytes; `out` is NULL or writable.
+ */
+int32_t gib_calibration_init_in(void *memory, uintptr_t size, struct gib_calibration **out);
+
+/**
+ * Makes an idle instance in memory that gib allocates.
+ *
+ * @return the handle, to be given to `gib_calibration_free`; NULL when there is no memory.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ */
+struct gib_calibration *gib_calibration_new(void);
+
+/**
+ * Frees an instance made by `gib_calibration_new`. NULL is allowed and does nothing.
+ *
+ * @param handle an instance from `gib_calibration_new`, never one from `gib_calibration_init_in`.
+ *
+ * [thread: setup] [real-time: no] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or came from `gib_calibration_new` and was not freed before.
+ */
+void gib_calibration_free(struct gib_calibration *handle);
+
+/**
+ * Checks the configuration and arms a calibration, which begins with the next step.
+ *
+ * The axis swings about where it stands, at one frequency after the other. With `add` the experiment joins those that
+ * this instance holds: change the workpiece's mass or the place in between, so that seat and bearing swing otherwise.
+ *
+ * @param handle the instance.
+ * @param config how to calibrate; copied. Set `struct_size`, zero the rest, then set what you want.
+ * @return GIB_OK; GIB_ERR_CONFIG (gib_calibration_last_error names the field and its range), GIB_ERR_STRUCT_SIZE,
+ * GIB_ERR_STATE while busy, GIB_ERR_CALIBRATION_ADD, GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup, or cycle between steps] [real-time: yes] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `config` is NULL or points to its `struct_size` readable bytes.
+ */
+int32_t gib_calibration_start(struct gib_calibration *handle,
+                              const struct gib_calibration_config *config);
+
+/**
+ * One servo cycle. Call it in every cycle, also when idle.
+ *
+ * While `owns_motion` is 1, follow `target_position_mm`. Whatever ends it, the amplitude falls to nothing first and the
+ * axis is where it stood, except after a drive fault, or when position or lag cannot be trusted: then nothing is
+ * commanded any more, and `stop_drive` says when to take the torque off.
+ *
+ * @param handle the instance.
+ * @param input measured values of this cycle, all of the same instant.
+ * @param output commands for this cycle; always written when not NULL.
+ * @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
+ * GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_TORQUE_BOUND, GIB_ERR_TRAVEL_BOUND, GIB_ERR_LAG,
+ * GIB_ERR_CALIBRATION_...; and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `input` is NULL or readable; `output` is NULL or writable.
+ */
+int32_t gib_calibration_step(struct gib_calibration *handle,
+                             const struct gib_calibration_input *input,
+                             struct gib_calibration_output *output);
+
+/**
+ * Ends a running calibration: the amplitude falls to nothing, then steps return GIB_ERR_ABORTED. Does nothing when not
+ * busy. To abort from another thread set `GIB_INPUT_ABORT` in the input.
+ *
+ * @param handle the instance.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance.
+ */
+int32_t gib_calibration_abort(struct gib_calibration *handle);
+
+/**
+ * Reads gains and phases over frequency, with their uncertainty and condition: after GIB_DONE, or after a load.
+ *
+ * @param handle the instance.
+ * @param table receives it; set its `struct_size` first.
+ * @return GIB_OK; GIB_ERR_STATE when there is none, GIB_ERR_STRUCT_SIZE when `table` is too small, GIB_ERR_NULL,
+ * GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `table` is NULL or points to its `struct_size` writable bytes.
+ */
+int32_t gib_calibration_result(const struct gib_calibration *handle,
+                               struct gib_calibration_table *table);
+
+/**
+ * Writes gains and phases to a file, JSON with schema "gib.calibration/1". An old file is replaced whole or not at all.
+ *
+ * @param handle the instance.
+ * @param path NUL-terminated; stays yours.
+ * @return GIB_OK; GIB_ERR_STATE when there is no table, GIB_ERR_IO, GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup] [real-time: no] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `path` is NULL or NUL-terminated.
+ */
+int32_t gib_calibration_save(struct gib_calibration *handle,
+                             const char *path);
+
+/**
+ * Reads gains and phases from a file that `gib_calibration_save` wrote; `gib_calibration_result` then gives them.
+ *
+ * @param handle the instance; what it held is replaced, or kept when the file cannot be used.
+ * @param path NUL-terminated; stays yours.
+ * @return GIB_OK; GIB_ERR_IO, GIB_ERR_FORMAT (gib_calibration_last_error names the key, or gives the line as `value`),
+ * GIB_ERR_CONFIG with the key that is out of range, GIB_ERR_STATE while busy, GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup] [real-time: no] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `path` is NULL or NUL-terminated.
+ */
+int32_t gib_calibration_load(struct gib_calibration *handle,
+                             const char *path);
+
+/**
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ *
+ * @param handle the instance.
+ * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `detail` is NULL or writable.
+ */
+int32_t gib_calibration_last_error(const struct gib_calibration *handle, struct gib_error_detail *detail);
 
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
@@ -3311,6 +4209,135 @@ int32_t gib_speed_variation_possible(const struct gib_speed_variation_config *co
  */
 int32_t gib_speed_variation_last_error(const struct gib_speed_variation *handle,
                                        struct gib_error_detail *detail);
+
+/**
+ * Bytes that an instance needs in memory of your own, to be aligned to 16.
+ *
+ * @return the size in bytes, about 4 KiB.
+ *
+ * [thread: any] [real-time: yes] [state: any]
+ */
+uintptr_t gib_vibration_size(void);
+
+/**
+ * Makes an idle instance in memory of your own. There is nothing to free; zero or reuse the memory when done.
+ *
+ * @param memory at least `gib_vibration_size()` bytes, aligned to 16; stays yours.
+ * @param size bytes at `memory`.
+ * @param out receives the handle; NULL on error.
+ * @return GIB_OK; GIB_ERR_NULL; GIB_ERR_MEMORY when too small or misaligned.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ *
+ * # Safety
+ * `memory` is NULL or points to `size` writable bytes; `out` is NULL or writable.
+ */
+int32_t gib_vibration_init_in(void *memory, uintptr_t size, struct gib_vibration **out);
+
+/**
+ * Makes an idle instance in memory that gib allocates.
+ *
+ * @return the handle, to be given to `gib_vibration_free`; NULL when there is no memory.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ */
+struct gib_vibration *gib_vibration_new(void);
+
+/**
+ * Frees an instance made by `gib_vibration_new`. NULL is allowed and does nothing.
+ *
+ * @param handle an instance from `gib_vibration_new`, never one from `gib_vibration_init_in`.
+ *
+ * [thread: setup] [real-time: no] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or came from `gib_vibration_new` and was not freed before.
+ */
+void gib_vibration_free(struct gib_vibration *handle);
+
+/**
+ * Checks the configuration and begins to correct the position, with the next step.
+ *
+ * The correction comes in by itself once the spindle has turned a whole revolution with good sensors.
+ *
+ * @param handle the instance.
+ * @param config how to correct; copied. Set `struct_size`, zero the rest, then set what you want.
+ * @param table gains and phases from `gib_calibration_result`; copied. NULL: both accelerometers are believed as they are.
+ * @return GIB_OK; GIB_ERR_CONFIG (gib_vibration_last_error names the field, of configuration or table, and its range),
+ * GIB_ERR_STRUCT_SIZE of either, GIB_ERR_STATE while busy, GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup, or cycle between steps] [real-time: yes] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `config` and `table` are each NULL or point to their `struct_size` readable bytes.
+ */
+int32_t gib_vibration_start(struct gib_vibration *handle,
+                            const struct gib_vibration_config *config,
+                            const struct gib_calibration_table *table);
+
+/**
+ * One servo cycle. Call it in every cycle, also when idle: the position is then the plain scale.
+ *
+ * `position_mm` is what to use in place of the scale, for the position loop's feedback or for learning the command. It
+ * never jumps on account of a sensor; `blend_ratio`, `reasons` and `message` say how far it is corrected and why not.
+ *
+ * @param handle the instance.
+ * @param input measured values of this cycle, all of the same instant.
+ * @param output the position; always written when not NULL.
+ * @return GIB_OK when idle, GIB_BUSY, or the first error, which is kept until the next start: GIB_ERR_ABORTED,
+ * GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE when the scale is no number (the last position is repeated in such a cycle);
+ * and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `input` is NULL or readable; `output` is NULL or writable.
+ */
+int32_t gib_vibration_step(struct gib_vibration *handle,
+                           const struct gib_vibration_input *input,
+                           struct gib_vibration_output *output);
+
+/**
+ * Ends the correction: it fades out within `fade_s`, then the plain scale is in force and steps return GIB_ERR_ABORTED.
+ * Does nothing when not busy. To abort from another thread set `GIB_INPUT_ABORT` in the input.
+ *
+ * @param handle the instance.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance.
+ */
+int32_t gib_vibration_abort(struct gib_vibration *handle);
+
+/**
+ * Reads what is known of the vibration now: harmonics, noise, offsets, how long the correction was out.
+ *
+ * @param handle the instance.
+ * @param report receives it.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `report` is NULL or writable.
+ */
+int32_t gib_vibration_result(const struct gib_vibration *handle, struct gib_vibration_report *report);
+
+/**
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ *
+ * @param handle the instance.
+ * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `detail` is NULL or writable.
+ */
+int32_t gib_vibration_last_error(const struct gib_vibration *handle, struct gib_error_detail *detail);
 
 /**
  * The table of all functions, so that `dlsym` needs one name: "gib_api".

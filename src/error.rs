@@ -162,8 +162,6 @@ pub const GIB_ERR_CALIBRATION_CONDITION: i32 = -703;
 pub const GIB_ERR_CALIBRATION_ADD: i32 = -704;
 /// A gain is beyond 0.1 to 10: a sensor's unit or sign is wrong.
 pub const GIB_ERR_CALIBRATION_GAIN: i32 = -705;
-/// The relative displacement does not repeat: something else shakes the machine, or the ball bar is loose.
-pub const GIB_ERR_CALIBRATION_NOISE: i32 = -706;
 
 /// Every status and the sentence that explains it.
 const TEXTS: &[(i32, &str)] = &[
@@ -243,7 +241,6 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_CALIBRATION_CONDITION, "the displacements are too near to opposite phase for the published formula\0"),
     (GIB_ERR_CALIBRATION_ADD, "the experiment cannot be added: too many, or other frequencies\0"),
     (GIB_ERR_CALIBRATION_GAIN, "a gain is beyond 0.1 to 10: a sensor's unit or sign is wrong\0"),
-    (GIB_ERR_CALIBRATION_NOISE, "the relative displacement does not repeat\0"),
 ];
 
 /// The text of a status, NUL-terminated and static; for an unknown number a text that says so.

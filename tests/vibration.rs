@@ -1,6 +1,6 @@
 //! The vibration correction against signals that are known in closed form: what it finds, how it fades, what it survives.
 //!
-//! `GIB_VIBRATION_CYCLES` sets the length of the long run (default 10 million cycles).
+//! `GIB_VIBRATION_CYCLES` sets the length of the long run (default 2 million cycles).
 
 use gib::cycle::calibration::table::{CalibrationPoint, CalibrationTable};
 use gib::cycle::vibration::config::*;
@@ -223,8 +223,16 @@ fn a_bad_sensor_is_named_and_faded_out() {
                 rig.cycle(spoil);
                 seen |= rig.output.reasons & reason != 0 && rig.output.message == message;
                 let jump = 1e3 * (rig.output.position_mm - last).abs();
-                // What is implausible may go on to the bound, 100 µm, before it is seen.
-                let most = if reason == GIB_VIBRATION_IMPLAUSIBLE { 20.0 } else { 1.0 };
+                // What is implausible may go on to the bound, 100 µm, before it is seen. Integrated, what is stuck at
+                // 0.123 m/s² goes on for a quarter turn, 25 ms: 3.1 mm/s or 1.6 µm a cycle beside what swings.
+                let stuck = reason == GIB_VIBRATION_STUCK && method == GIB_VIBRATION_INTEGRATE;
+                let most = if reason == GIB_VIBRATION_IMPLAUSIBLE {
+                    20.0
+                } else if stuck {
+                    2.6
+                } else {
+                    1.0
+                };
                 assert!(jump < most, "method {method}, fault {fault}: {jump} µm");
                 last = rig.output.position_mm;
             }
@@ -296,11 +304,12 @@ fn it_fades_out_when_aborted_and_fails_on_a_scale_that_is_no_number() {
 #[test]
 fn nothing_drifts_in_a_long_run() {
     let cycles: u64 =
-        std::env::var("GIB_VIBRATION_CYCLES").map_or(10_000_000, |n| n.parse().expect("a number of cycles"));
+        std::env::var("GIB_VIBRATION_CYCLES").map_or(2_000_000, |n| n.parse().expect("a number of cycles"));
     let mut rig = Rig::new(&config(), None);
     rig.noise = 0.01;
     rig.error(20_000);
-    let early = rig.error(20_000);
+    // Averaging over 8 revolutions of 200 cycles leaves 250 independent errors in each of these.
+    let early = rig.error(400_000);
     for i in 0..cycles {
         rig.offset = [0.4 + 1e-7 * (i % 1_000_000) as f64, -0.3];
         rig.cycle(|_| ());
@@ -309,7 +318,7 @@ fn nothing_drifts_in_a_long_run() {
     rig.error(5000);
     rig.rate = SPEED / 60.0;
     rig.error(20_000);
-    let late = rig.error(20_000);
+    let late = rig.error(400_000);
     println!("error {early:.4} µm at the start, {late:.4} µm after {cycles} cycles");
     assert!(late < 1.2 * early && late > 0.8 * early && early < 0.3);
 }

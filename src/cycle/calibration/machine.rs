@@ -9,14 +9,16 @@
 //! one door `leave`, lets a fall to nothing and ends where the axis stood. Each moving state lasts a number of cycles that
 //! is known when it is entered; that is its deadline.
 
+mod danger;
+
 use super::detect::Detector;
 use super::io::*;
 use super::plan::{BLOCKS, Plan};
 use super::solve::{Complex, Experiment, Gains, least_squares, published};
 use super::table::{CalibrationPoint, CalibrationTable, GIB_CALIBRATION_POINTS};
-use crate::cycle::backlash::io::GIB_INPUT_ABORT;
 use crate::cycle::turns::{cos_sin, fold};
 use crate::error::*;
+use danger::stops;
 
 /// Most experiments that one instance holds.
 pub const GIB_CALIBRATION_EXPERIMENTS: usize = 8;
@@ -46,8 +48,6 @@ enum Phase {
     Failed,
 }
 
-/// Name of the input without which the axis is lost.
-const POSITION: &str = "position_mm\0";
 /// First amplitude, as part of the largest that stroke, speed and acceleration allow.
 const FIRST: f64 = 0.1;
 /// Largest growth from one probe to the next: friction and resonance are not proportional.
@@ -199,52 +199,6 @@ impl Calibration {
         if self.busy() {
             self.command();
         }
-    }
-
-    /// Anything in this cycle's input that must end the calibration. On the way out only what stops the drive does.
-    #[inline(always)]
-    fn danger(&self, input: &CalibrationInput) -> Option<Fault> {
-        let [a1, a2] = input.acceleration_m_s2;
-        let [s1, s2, s3] = self.plan.saturation;
-        let off = input.position_mm - self.start;
-        // Each comparison is false for what is no number.
-        let safe = input.flags == 0
-            && (off.abs() <= self.plan.travel)
-            && ((input.position_mm - self.output.target_position_mm).abs() <= self.plan.lag)
-            && (input.torque.abs() <= self.plan.torque_bound)
-            && (a1.abs() < s1)
-            && (a2.abs() < s2)
-            && (input.ball_bar_um.abs() < s3);
-        if safe { None } else { self.name_danger(input).filter(|f| self.phase != Phase::Stopping || stops(f)) }
-    }
-
-    #[cold]
-    fn name_danger(&self, input: &CalibrationInput) -> Option<Fault> {
-        if input.flags & GIB_INPUT_ABORT != 0 {
-            return Some(Fault::of(GIB_ERR_ABORTED));
-        }
-        if input.flags != 0 {
-            return Some(Fault::of(GIB_ERR_DRIVE_FAULT));
-        }
-        let [a1, a2] = input.acceleration_m_s2;
-        let off = input.position_mm - self.start;
-        let lag = input.position_mm - self.output.target_position_mm;
-        let [s1, s2, s3] = self.plan.saturation;
-        let bound = self.plan.torque_bound;
-        [
-            (GIB_ERR_TRAVEL_BOUND, POSITION, off, self.plan.travel),
-            (GIB_ERR_LAG, POSITION, lag, self.plan.lag),
-            (GIB_ERR_TORQUE_BOUND, "torque\0", input.torque, bound),
-            (GIB_ERR_CALIBRATION_SATURATED, "acceleration_m_s2[0]\0", a1, s1),
-            (GIB_ERR_CALIBRATION_SATURATED, "acceleration_m_s2[1]\0", a2, s2),
-            (GIB_ERR_CALIBRATION_SATURATED, "ball_bar_um\0", input.ball_bar_um, s3),
-        ]
-        .into_iter()
-        .find(|(_, _, value, most)| !(value.abs() <= *most))
-        .map(|(code, field, value, most)| {
-            let code = if value.is_finite() { code } else { GIB_ERR_NON_FINITE };
-            Fault { code, field, value, low: -most, high: most }
-        })
     }
 
     /// The state's own work.
@@ -487,12 +441,6 @@ impl Calibration {
             output.amplitude_mm = 0.0;
         }
     }
-}
-
-/// Faults after which the axis cannot be brought back under command.
-fn stops(fault: &Fault) -> bool {
-    let lost = fault.code == GIB_ERR_NON_FINITE && fault.field == POSITION;
-    lost || matches!(fault.code, GIB_ERR_DRIVE_FAULT | GIB_ERR_LAG | GIB_ERR_TRAVEL_BOUND)
 }
 
 /// The table's entry.
