@@ -18,7 +18,7 @@ RELEASE := $(TARGET)/$(PROFILE)
 # What a C program outside the tree would find installed: the libraries with their links.
 LIB := build/lib
 
-.PHONY: all build header demo test deps check-format check-lints test-rust test-harness bench install uninstall clean help
+.PHONY: all build header demo test deps check-format check-lints test-rust test-harness linuxcnc-test bench install uninstall clean help
 
 all: build
 
@@ -40,7 +40,7 @@ demo: build ## show what gib does
 	@test ! -e c-harness/Makefile || $(MAKE) -s -C c-harness all
 	@GIB=$(RELEASE)/gib tools/demo
 
-test: deps check-format build check-lints test-rust test-harness ## everything that must hold
+test: deps check-format build check-lints test-rust test-harness linuxcnc-test ## everything that must hold
 	@echo "make test: all passed"
 
 deps: ## install the Debian packages that the tests need
@@ -61,6 +61,11 @@ test-rust:
 
 test-harness:
 	@if [ -e c-harness/Makefile ]; then $(MAKE) -C c-harness test; else echo "test-harness: skipped, no c-harness/Makefile"; fi
+
+linuxcnc-test: build ## a simulated mill in the real control, headless; skipped where LinuxCNC is not installed
+	@if ! command -v linuxcnc >/dev/null || ! command -v halcompile >/dev/null; then \
+	    echo "linuxcnc-test: skipped, no linuxcnc or halcompile (Debian: linuxcnc-uspace, linuxcnc-uspace-dev)"; \
+	else $(MAKE) -s -C linuxcnc test; fi
 
 bench: build ## instructions per step, printed
 	@if [ -e c-harness/Makefile ]; then $(MAKE) -C c-harness bench; else echo "bench: skipped, no c-harness/Makefile"; fi
