@@ -245,14 +245,12 @@ fn steady(sweep: &Sweep) -> Option<Mean> {
 /// Bins over the way to sliding.
 const BINS: f64 = 200.0;
 
-/// Sets aside reversals at much more than the slowest speed: there the torque also moves masses.
+/// Sets aside reversals at much more than the slowest speed at which one shows lost motion: there the torque also moves masses.
 fn leave_out_fast(turns: &mut [Turn]) {
-    let speeds: Vec<Option<f64>> = turns.iter().map(|turn| turn.fit(0.0, 0.0).ok().map(|_| turn.speed)).collect();
-    let slowest = speeds.iter().flatten().copied().fold(f64::INFINITY, f64::min);
-    for (turn, speed) in turns.iter_mut().zip(speeds) {
-        if speed.is_some_and(|speed| speed > SPEED_RATIO * slowest) {
-            turn.levels = Err("much faster than the slowest reversal".into());
-        }
+    let slowest =
+        turns.iter().filter(|turn| turn.fit(0.0, 0.0).is_ok()).map(|turn| turn.speed).fold(f64::INFINITY, f64::min);
+    for turn in turns.iter_mut().filter(|turn| turn.speed > SPEED_RATIO * slowest) {
+        turn.levels = Err("much faster than the slowest reversal".into());
     }
 }
 
