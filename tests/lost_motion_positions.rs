@@ -4,37 +4,15 @@
 //! Ishlinskii), which loses exactly the weighted sum of their widths at every reversal; then come the scale error, the
 //! periodic errors of both encoders, drift, a late reading, noise and the grids.
 
+#[path = "support/random.rs"]
+mod random;
+
 use std::f64::consts::TAU;
 
 use gib::analysis::lost_motion::Refusal;
 use gib::analysis::lost_motion::from_positions::measure;
 use gib::recording::{Column, Recording};
-
-/// SplitMix64 (Steele, Lea, Flood 2014).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-
-    /// Even on a logarithmic scale.
-    fn scale(&mut self, low: f64, high: f64) -> f64 {
-        self.between(low.ln(), high.ln()).exp()
-    }
-
-    fn normal(&mut self) -> f64 {
-        (-2.0 * (1.0 - self.next()).ln()).sqrt() * (TAU * self.next()).cos()
-    }
-}
+use random::Random;
 
 /// An axis and a move, in µm and s.
 #[derive(Debug, Clone)]

@@ -4,33 +4,17 @@
 //! a table that sticks until the spring exceeds its break-away friction and then slides. The truth is read off the table:
 //! the change of (motor − table) between sliding one way and the other.
 
+#[path = "support/random.rs"]
+mod random;
+
 use std::f64::consts::TAU;
+use std::process::Command;
 
 use gib::analysis::lost_motion::Refusal;
 use gib::analysis::lost_motion::from_torque::{MotorFriction, estimate};
 use gib::machine::Machine;
 use gib::recording::{Column, Recording};
-
-/// SplitMix64 (Steele, Lea, Flood 2014).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-
-    fn normal(&mut self) -> f64 {
-        (-2.0 * (1.0 - self.next()).ln()).sqrt() * (TAU * self.next()).cos()
-    }
-}
+use random::Random;
 
 /// A drive and a move; µm, N·m, s.
 #[derive(Debug, Clone)]
@@ -293,6 +277,41 @@ fn a_machine_file_takes_viscous_friction_off() {
     let (with, without) = (median(&mut with), median(&mut without));
     println!("median error {:.2} % with the machine file, {:.2} % without", 100.0 * with, 100.0 * without);
     assert!(covered >= 34 && with < 0.02 && without > 2.0 * with);
+}
+
+/// Test moves are slow and fast. In the fast ones the torque also moves masses: they are set aside, also where the model takes
+/// most of that off. The truth is what the simulated table lost.
+#[test]
+fn fast_reversals_beside_slow_ones_do_not_spoil_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let [machine, recording] = ["m.json", "r.csv"].map(|name| folder.path().join(name));
+    std::fs::write(
+        &machine,
+        r#"{"schema": "gib.machine/1", "name": "made", "axes": [{"name": "x", "drive": "ball_screw", "lead_mm": 10.0,
+            "inertia_kg_m2": 0.0028, "coulomb_friction_nm": 0.9, "viscous_friction_nm_s": 0.008, "torque_limit_nm": 16.0,
+            "servo": {"period_s": 0.001, "position_gain_1_s": 40.0, "velocity_gain_nm_s": 0.528,
+                      "velocity_integral_time_s": 0.02, "velocity_feedforward": 1.0, "torque_time_constant_s": 0.0005},
+            "effects": [{"cause": "backlash", "parameters": {"backlash_um": 20.0}},
+                        {"cause": "drive_compliance", "parameters": {"resonance_hz": 120.0, "stiffness_n_um": 90.0}}]}]}"#,
+    )
+    .unwrap();
+    let gib = |words: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_gib"));
+        let command = command.current_dir(folder.path()).args(words.split(' '));
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{words}: {}", String::from_utf8_lossy(&output.stderr));
+        output.stdout
+    };
+    gib("simulate --machine m.json --moves test --torque-noise 0.02 --out r.csv");
+    let lost = |from: &str| {
+        let words = format!("lost-motion r.csv --machine m.json --method {from} --json");
+        let answer: serde_json::Value = serde_json::from_slice(&gib(&words)).unwrap();
+        ["lost_motion_um", "uncertainty_um"].map(|key| answer[key].as_f64().unwrap())
+    };
+    assert!(recording.exists());
+    let ([truth, _], [value, uncertainty]) = (lost("positions"), lost("torque"));
+    println!("the table lost {truth:.2} µm; from torque {value:.2} ± {uncertainty:.2} µm");
+    assert!((value - truth).abs() < uncertainty && uncertainty < 0.02 * truth);
 }
 
 #[test]
