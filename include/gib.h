@@ -439,6 +439,41 @@
 #define GIB_ERR_CALIBRATION_GAIN (-705)
 
 /**
+ * The load table is too short, full, or does not rise with the depth beyond its uncertainty.
+ */
+#define GIB_ERR_TILT_TABLE (-500)
+
+/**
+ * The cut is of another machining condition than the load table.
+ */
+#define GIB_ERR_TILT_CONDITION (-501)
+
+/**
+ * Too few readings of the load along the path.
+ */
+#define GIB_ERR_TILT_DATA (-502)
+
+/**
+ * The load lies outside the table.
+ */
+#define GIB_ERR_TILT_RANGE (-503)
+
+/**
+ * The offsets that undo the tilt are larger than allowed.
+ */
+#define GIB_ERR_TILT_SIZE (-504)
+
+/**
+ * The depth along the path is no line or plane: too many outliers.
+ */
+#define GIB_ERR_TILT_SHAPE (-505)
+
+/**
+ * The samples of the current fall on too few of its phases for a true RMS.
+ */
+#define GIB_ERR_TILT_ALIAS (-506)
+
+/**
  * Slow-feed mode (default): the motor is fed slowly and the torque read in every cycle. The more accurate one.
  */
 #define GIB_BACKLASH_SLOW_FEED 0
@@ -880,6 +915,181 @@
 #define GIB_SPEED_VARIATION_STOP 8
 
 /**
+ * Measure, warn, compensate (default).
+ */
+#define GIB_TILT_COMPENSATE 0
+
+/**
+ * Measure and report only.
+ */
+#define GIB_TILT_MEASURE_ONLY 1
+
+/**
+ * A cut of known depth: its mean load becomes a row of a table.
+ */
+#define GIB_TILT_TEACH 2
+
+/**
+ * Plane through the whole path (default).
+ */
+#define GIB_TILT_FIT 0
+
+/**
+ * Two points of the path, as published. Carries the whole noise and wear of two readings.
+ */
+#define GIB_TILT_TWO_POINT 1
+
+/**
+ * `load` is the rectified current of a motor phase, A: true RMS over whole electrical periods (default).
+ */
+#define GIB_TILT_AC_CURRENT 0
+
+/**
+ * `load` is a DC load signal, %: its mean.
+ */
+#define GIB_TILT_DC_LOAD 1
+
+/**
+ * Refuse another machining condition than the table's (default).
+ */
+#define GIB_TILT_REFUSE 0
+
+/**
+ * Go on under another condition and say so in the report's `flagged`.
+ */
+#define GIB_TILT_FLAG 1
+
+/**
+ * No rotary axis.
+ */
+#define GIB_TILT_AXIS_NONE 0
+
+/**
+ * Rotary axis A, about X.
+ */
+#define GIB_TILT_AXIS_A 1
+
+/**
+ * Rotary axis B, about Y.
+ */
+#define GIB_TILT_AXIS_B 2
+
+/**
+ * Rotary axis C, about Z.
+ */
+#define GIB_TILT_AXIS_C 3
+
+/**
+ * Nothing is measured and no offset is in force.
+ */
+#define GIB_TILT_IDLE 0
+
+/**
+ * Reads the load along the path.
+ */
+#define GIB_TILT_MEASURING 1
+
+/**
+ * Evaluates the path in slices.
+ */
+#define GIB_TILT_EVALUATE 2
+
+/**
+ * Warns that offsets are to come, and waits for the acknowledgement.
+ */
+#define GIB_TILT_WARNING 3
+
+/**
+ * Brings the offsets in.
+ */
+#define GIB_TILT_RAMP_ON 4
+
+/**
+ * The offsets are in force.
+ */
+#define GIB_TILT_ACTIVE 5
+
+/**
+ * Takes the offsets out.
+ */
+#define GIB_TILT_RAMP_OFF 6
+
+/**
+ * Ended well, no offset in force.
+ */
+#define GIB_TILT_DONE 7
+
+/**
+ * Ended with an error, no offset in force; kept until the next start.
+ */
+#define GIB_TILT_FAILED 8
+
+/**
+ * Input flag: the tool is in the cut, at feed. One stretch with it is one pass.
+ */
+#define GIB_TILT_INPUT_CUTTING 4
+
+/**
+ * Input flag: the path to be measured is finished.
+ */
+#define GIB_TILT_INPUT_END 8
+
+/**
+ * Input flag: take the offsets out; the family then ends well.
+ */
+#define GIB_TILT_INPUT_OFF 16
+
+/**
+ * Rows that a table can hold.
+ */
+#define GIB_TILT_ROWS 32
+
+/**
+ * Not decided yet.
+ */
+#define GIB_TILT_UNDECIDED 0
+
+/**
+ * Within the band that is left alone.
+ */
+#define GIB_TILT_IN_BAND 1
+
+/**
+ * Not larger than its uncertainty: nothing is done.
+ */
+#define GIB_TILT_NOT_SIGNIFICANT 2
+
+/**
+ * A tilt that is to be compensated.
+ */
+#define GIB_TILT_SIGNIFICANT 3
+
+/**
+ * A cut of known depth was read.
+ */
+#define GIB_TILT_TAUGHT 4
+
+/**
+ * The operator took the compensation off at the warning.
+ */
+#define GIB_TILT_DECLINED 5
+
+/**
+ * The workpiece is tilted about x (rotary axis A): the slope is along y.
+ */
+#define GIB_TILT_ABOUT_X 1
+
+/**
+ * The workpiece is tilted about y (rotary axis B): the slope is along x.
+ */
+#define GIB_TILT_ABOUT_Y 2
+
+/**
+ * The path was one oblique line, which cannot tell the two apart: cut in a second direction.
+ */
+#define GIB_TILT_ABOUT_EITHER 4
+
+/**
  * Harmonics of the spindle's turn, each divided by −ω² (default).
  */
 #define GIB_VIBRATION_HARMONIC 0
@@ -1036,6 +1246,11 @@ typedef struct gib_recorder gib_recorder;
  * A speed variation of one spindle. Opaque; its size is `gib_speed_variation_size()`.
  */
 typedef struct gib_speed_variation gib_speed_variation;
+
+/**
+ * Tilt of one workpiece. Opaque; its size is `gib_tilt_size()`.
+ */
+typedef struct gib_tilt gib_tilt;
 
 /**
  * The corrected position of one tool slide. Opaque; its size is `gib_vibration_size()`.
@@ -2531,6 +2746,440 @@ typedef struct gib_speed_variation_limits {
 } gib_speed_variation_limits;
 
 /**
+ * A machining condition. A table holds for one only.
+ */
+typedef struct gib_tilt_condition {
+    /**
+     * Number of the tool, any.
+     */
+    uint32_t tool_id;
+    /**
+     * Number of the material, any.
+     */
+    uint32_t material_id;
+    /**
+     * Spindle speed, 1 to 1000000 min⁻¹.
+     */
+    double speed_rpm;
+    /**
+     * Feed along the path, 0.1 to 1000000 mm/min.
+     */
+    double feed_mm_min;
+} gib_tilt_condition;
+
+/**
+ * One rotary axis of a machine with four or five axes.
+ */
+typedef struct gib_tilt_rotary {
+    /**
+     * `GIB_TILT_AXIS_…`; none (default) leaves the tilt to z.
+     */
+    int32_t axis;
+    /**
+     * 0: the axis turns the workpiece (default). 1: it turns the tool.
+     */
+    int32_t turns_tool;
+    /**
+     * +1 (0 means +1): a positive command turns what it carries by the right hand about the machine's axis. -1: the other way.
+     */
+    int32_t sense;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
+    /**
+     * A point on the axis of rotation at the angles of the measurement, mm: in machine coordinates where it turns the
+     * workpiece, from the tool tip where it turns the tool.
+     */
+    double pivot_mm[3];
+} gib_tilt_rotary;
+
+/**
+ * How to measure and compensate. Zero in a field means its default; fields marked "required" have none.
+ */
+typedef struct gib_tilt_config {
+    /**
+     * Size of this struct as the caller knows it: `sizeof(gib_tilt_config)`. Required.
+     */
+    uint32_t struct_size;
+    /**
+     * `GIB_TILT_COMPENSATE` (default), `GIB_TILT_MEASURE_ONLY` or `GIB_TILT_TEACH`.
+     */
+    int32_t purpose;
+    /**
+     * `GIB_TILT_FIT` (default) or `GIB_TILT_TWO_POINT`. Both are reported.
+     */
+    int32_t method;
+    /**
+     * `GIB_TILT_AC_CURRENT` (default) or `GIB_TILT_DC_LOAD`; must be the table's.
+     */
+    int32_t signal;
+    /**
+     * Another condition than the table's: `GIB_TILT_REFUSE` (default) or `GIB_TILT_FLAG`.
+     */
+    int32_t other_condition;
+    /**
+     * Pole pairs of the spindle motor, times the ratio of its gear when it has one, 1 to 100. Required for a current.
+     */
+    int32_t pole_pairs;
+    /**
+     * 1: the kernel keeps the tool at the workpiece when rotary axes turn (tool centre point control, RTCP), so that
+     * x y z get no pivot's offset. 0 (default): gib adds it.
+     */
+    int32_t tool_centre_point;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
+    /**
+     * Servo period, 0.00005 to 0.02 s. Required.
+     */
+    double cycle_s;
+    /**
+     * Condition of this cut; compared with the table's. Required.
+     */
+    struct gib_tilt_condition condition;
+    /**
+     * Speed and feed may differ from the condition by this, 0.001 to 0.5 (default 0.05).
+     */
+    double condition_tolerance_ratio;
+    /**
+     * Length of path at both ends of every pass that does not count, since the tool enters or leaves there, 0 to 1000 mm
+     * (default 0: the weights alone reject it). The tool's diameter is a good choice.
+     */
+    double entry_mm;
+    /**
+     * Time over which load is averaged before it is turned into depth, 8 cycles to 10 s (default 0.1; longer where the
+     * time limit needs it, see there).
+     */
+    double block_s;
+    /**
+     * Longest time in the cut, 1 to 20000 s (default 200). Beyond 2000 blocks, blocks get longer.
+     */
+    double time_limit_s;
+    /**
+     * Expected wear (k = 1): share by which the apparent depth grows in a metre of cut, 0.00001 to 10 (default 0.01). Only
+     * where the passes cannot tell wear from tilt; it then enters the uncertainty.
+     */
+    double wear_ratio_m;
+    /**
+     * A tilt up to this is left alone, 0 to 45° (default 0).
+     */
+    double band_deg;
+    /**
+     * A change of load along the path up to this is left alone, in the unit of the load (default 0).
+     */
+    double band_load;
+    /**
+     * Depth that the path shall cut everywhere, mm. 0 (default): the depth at the start of the path.
+     */
+    double nominal_depth_mm;
+    /**
+     * Largest offset of x, y and z, 0.001 to 100 mm (default 5).
+     */
+    double offset_max_mm;
+    /**
+     * Largest offset of a, b and c, 0.001 to 45° (default 5).
+     */
+    double offset_max_deg;
+    /**
+     * Largest speed of an offset, 0.001 to 1000 mm/s (default 20). It bounds the ramps, and z while the path goes on.
+     */
+    double offset_speed_mm_s;
+    /**
+     * Largest acceleration of an offset, 0.01 to 100000 mm/s² (default 100).
+     */
+    double offset_acceleration_mm_s2;
+    /**
+     * Largest speed of an angular offset, 0.0001 to 1000 °/s (default 1).
+     */
+    double offset_speed_deg_s;
+    /**
+     * Largest acceleration of an angular offset, 0.001 to 100000 °/s² (default 10).
+     */
+    double offset_acceleration_deg_s2;
+    /**
+     * Time within which the warning must be acknowledged, 2 cycles to 3600 s (default 60).
+     */
+    double ack_timeout_s;
+    /**
+     * Rotary axes, the one nearest the machine's bed first; the second is carried by it when both turn the same side.
+     */
+    struct gib_tilt_rotary rotary[2];
+} gib_tilt_config;
+/**
+ * Size of the struct in the first published ABI.
+ */
+#define gib_tilt_config_FIRST_SIZE 264
+
+/**
+ * Load by depth of cut under one condition, in the order of depth. Plain numbers: fill it by hand, by
+ * `gib_tilt_table_add` or from a file.
+ */
+typedef struct gib_tilt_table {
+    /**
+     * Size of this struct as the caller knows it: `sizeof(gib_tilt_table)`. Required.
+     */
+    uint32_t struct_size;
+    /**
+     * Rows in use, up to `GIB_TILT_ROWS`; a measurement needs 2.
+     */
+    uint32_t rows;
+    /**
+     * The condition under which the rows were cut.
+     */
+    struct gib_tilt_condition condition;
+    /**
+     * `GIB_TILT_AC_CURRENT` or `GIB_TILT_DC_LOAD`: what the loads are.
+     */
+    int32_t signal;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
+    /**
+     * Depth of cut of each row, mm, rising.
+     */
+    double depth_mm[GIB_TILT_ROWS];
+    /**
+     * Load of each row, rising.
+     */
+    double load[GIB_TILT_ROWS];
+    /**
+     * Standard uncertainty of each load; 0: not known, taken as exact.
+     */
+    double load_std[GIB_TILT_ROWS];
+    /**
+     * Cuts that each row is the mean of.
+     */
+    uint32_t cuts[GIB_TILT_ROWS];
+} gib_tilt_table;
+/**
+ * Size of the struct in the first published ABI.
+ */
+#define gib_tilt_table_FIRST_SIZE 936
+
+/**
+ * What the kernel tells gib in a cycle.
+ */
+typedef struct gib_tilt_input {
+    /**
+     * Commanded position x y z of the tool tip in machine coordinates, without gib's offsets, mm.
+     */
+    double position_mm[3];
+    /**
+     * Commanded angles a b c without gib's offsets, °; 0 for an axis that is not there.
+     */
+    double rotary_deg[3];
+    /**
+     * Spindle load: current of one phase, rectified or not, A; or DC load, %.
+     */
+    double load;
+    /**
+     * Spindle speed, min⁻¹; the sign does not matter.
+     */
+    double speed_rpm;
+    /**
+     * `request_id` of the last warning that the operator has accepted; 0 before the first.
+     */
+    uint32_t acknowledged_id;
+    /**
+     * `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`, `GIB_TILT_INPUT_…`; other bits must be 0.
+     */
+    uint32_t flags;
+} gib_tilt_input;
+
+/**
+ * What gib asks of the kernel in a cycle. Always written, and safe, also when the call returns an error.
+ */
+typedef struct gib_tilt_output {
+    /**
+     * Add to the commanded x y z, mm.
+     */
+    double offset_mm[3];
+    /**
+     * Add to the commanded a b c, °.
+     */
+    double offset_deg[3];
+    /**
+     * What the step returned: `GIB_OK`, `GIB_BUSY`, `GIB_DONE` or the first error.
+     */
+    int32_t status;
+    /**
+     * One of the `GIB_TILT_…` phases.
+     */
+    int32_t phase;
+    /**
+     * Message number: 0, or the error to tell the operator about; its text is `gib_status_text`.
+     */
+    int32_t message;
+    /**
+     * 1: the operator is to be warned that offsets are to come, and to accept it.
+     */
+    int32_t warning;
+    /**
+     * Number of the present warning, to be given back in `acknowledged_id`; 0: none was given yet.
+     */
+    uint32_t request_id;
+    /**
+     * 1: the position asks for more than the largest offset, which is put out instead.
+     */
+    int32_t limited;
+} gib_tilt_output;
+
+/**
+ * What was found. Angles in °; uncertainties are expanded, k = 2.
+ */
+typedef struct gib_tilt_report {
+    /**
+     * Angle between the workpiece's plane and the path's, 0 or above.
+     */
+    double tilt_deg;
+    /**
+     * Its uncertainty.
+     */
+    double uncertainty_deg;
+    /**
+     * Tilt about x by the right hand; the surface rises along +y.
+     */
+    double about_x_deg;
+    /**
+     * Its uncertainty; 90 where the path cannot tell.
+     */
+    double about_x_uncertainty_deg;
+    /**
+     * Tilt about y by the right hand; the surface falls along +x.
+     */
+    double about_y_deg;
+    /**
+     * Its uncertainty; 90 where the path cannot tell.
+     */
+    double about_y_uncertainty_deg;
+    /**
+     * Slope of the surface along x, mm/mm.
+     */
+    double slope_x_ratio;
+    /**
+     * Slope of the surface along y, mm/mm.
+     */
+    double slope_y_ratio;
+    /**
+     * Direction of the path, or of its longer side, from +x toward +y, -90 to 90.
+     */
+    double path_deg;
+    /**
+     * Depth at the middle of the path as the tool of its start would see it, mm; 0 when teaching.
+     */
+    double depth_mm;
+    /**
+     * Load at the middle of the path: the row to be added when teaching.
+     */
+    double load;
+    /**
+     * Standard uncertainty of that load.
+     */
+    double load_std;
+    /**
+     * Wear: share by which the apparent depth grows in a metre of cut; 0 where not told apart from tilt.
+     */
+    double wear_ratio_m;
+    /**
+     * Its uncertainty.
+     */
+    double wear_uncertainty_ratio_m;
+    /**
+     * The published rule on the two ends of the path: depths, mm; 0 outside the table.
+     */
+    double two_point_depth_mm[2];
+    /**
+     * The published rule's tilt.
+     */
+    double two_point_deg;
+    /**
+     * Scatter of a block about the plane, in load.
+     */
+    double scatter_load;
+    /**
+     * Offsets x y z at the start of the path, mm; 0 unless the tilt is to be compensated.
+     */
+    double offset_mm[3];
+    /**
+     * Offsets a b c.
+     */
+    double offset_deg[3];
+    /**
+     * Slope that z follows along x and y, mm/mm: all of the tilt, or what no rotary axis reaches.
+     */
+    double z_slope_ratio[2];
+    /**
+     * `GIB_TILT_IN_BAND` and so on.
+     */
+    int32_t decision;
+    /**
+     * Sum of `GIB_TILT_ABOUT_…`: the axes about which the tilt is beyond its uncertainty.
+     */
+    int32_t axes;
+    /**
+     * Sum of `GIB_TILT_ABOUT_…`: the axes that the directions of the path can tell.
+     */
+    int32_t axes_seen;
+    /**
+     * 1: wear was told from tilt by reversed or repeated passes. 0: its expected amount is in the uncertainty.
+     */
+    int32_t wear_separated;
+    /**
+     * 1: cut under another condition than the table's.
+     */
+    int32_t flagged;
+    /**
+     * `GIB_TILT_FIT` or `GIB_TILT_TWO_POINT`.
+     */
+    int32_t method;
+    /**
+     * Status of the step that ended the run, or of the last one.
+     */
+    int32_t status;
+    /**
+     * Blocks that were fitted.
+     */
+    uint32_t blocks;
+    /**
+     * Of these, without weight: entry, exit, chips.
+     */
+    uint32_t rejected;
+    /**
+     * Blocks left out: spindle speed or feed of another condition.
+     */
+    uint32_t off_condition;
+    /**
+     * Blocks left out: load outside the table.
+     */
+    uint32_t outside_table;
+    /**
+     * Blocks left out: samples on too few phases of the current.
+     */
+    uint32_t aliased;
+} gib_tilt_report;
+
+/**
+ * What the published rule makes of two points of a path.
+ */
+typedef struct gib_tilt_two_point_result {
+    /**
+     * Depth of cut at each point, mm.
+     */
+    double depth_mm[2];
+    /**
+     * atan(|difference of depth| ÷ |distance|), °.
+     */
+    double tilt_deg;
+    /**
+     * Difference of depth ÷ distance, signed along rising position, mm/mm.
+     */
+    double slope;
+} gib_tilt_two_point_result;
+
+/**
  * How the position is to be corrected. Zero in a field means its default; fields marked "required" have none.
  */
 typedef struct gib_vibration_config {
@@ -3107,6 +3756,76 @@ typedef struct gib_api_table {
      * See gib_calibration_last_error.
      */
     int32_t (*calibration_last_error)(const struct gib_calibration *handle, struct gib_error_detail *detail);
+    /**
+     * See gib_tilt_size.
+     */
+    uintptr_t (*tilt_size)(void);
+    /**
+     * See gib_tilt_init_in.
+     */
+    int32_t (*tilt_init_in)(void *memory, uintptr_t size, struct gib_tilt **out);
+    /**
+     * See gib_tilt_new.
+     */
+    struct gib_tilt *(*tilt_new)(void);
+    /**
+     * See gib_tilt_free.
+     */
+    void (*tilt_free)(struct gib_tilt *handle);
+    /**
+     * See gib_tilt_start.
+     */
+    int32_t (*tilt_start)(struct gib_tilt *handle,
+                          const struct gib_tilt_config *config,
+                          const struct gib_tilt_table *table);
+    /**
+     * See gib_tilt_step.
+     */
+    int32_t (*tilt_step)(struct gib_tilt *handle,
+                         const struct gib_tilt_input *input,
+                         struct gib_tilt_output *output);
+    /**
+     * See gib_tilt_abort.
+     */
+    int32_t (*tilt_abort)(struct gib_tilt *handle);
+    /**
+     * See gib_tilt_result.
+     */
+    int32_t (*tilt_result)(const struct gib_tilt *handle, struct gib_tilt_report *report);
+    /**
+     * See gib_tilt_last_error.
+     */
+    int32_t (*tilt_last_error)(const struct gib_tilt *handle, struct gib_error_detail *detail);
+    /**
+     * See gib_tilt_table_add.
+     */
+    int32_t (*tilt_table_add)(struct gib_tilt_table *table,
+                              double depth_mm,
+                              double load,
+                              double load_std,
+                              struct gib_error_detail *detail);
+    /**
+     * See gib_tilt_table_check.
+     */
+    int32_t (*tilt_table_check)(const struct gib_tilt_table *table, struct gib_error_detail *detail);
+    /**
+     * See gib_tilt_table_save.
+     */
+    int32_t (*tilt_table_save)(const struct gib_tilt_table *table,
+                               const char *path,
+                               struct gib_error_detail *detail);
+    /**
+     * See gib_tilt_table_load.
+     */
+    int32_t (*tilt_table_load)(struct gib_tilt_table *table, const char *path, struct gib_error_detail *detail);
+    /**
+     * See gib_tilt_two_point.
+     */
+    int32_t (*tilt_two_point)(const struct gib_tilt_table *table,
+                              const double *position_mm,
+                              const double *load,
+                              struct gib_tilt_two_point_result *result,
+                              struct gib_error_detail *detail);
 } gib_api_table;
 
 #ifdef __cplusplus
@@ -4209,6 +4928,234 @@ int32_t gib_speed_variation_possible(const struct gib_speed_variation_config *co
  */
 int32_t gib_speed_variation_last_error(const struct gib_speed_variation *handle,
                                        struct gib_error_detail *detail);
+
+/**
+ * Bytes that an instance needs in memory of your own, to be aligned to 16.
+ *
+ * @return the size in bytes, about 132 KiB.
+ *
+ * [thread: any] [real-time: yes] [state: any]
+ */
+uintptr_t gib_tilt_size(void);
+
+/**
+ * Makes an idle instance in memory of your own. There is nothing to free; zero or reuse the memory when done.
+ *
+ * @param memory at least `gib_tilt_size()` bytes, aligned to 16; stays yours.
+ * @param size bytes at `memory`.
+ * @param out receives the handle; NULL on error.
+ * @return GIB_OK; GIB_ERR_NULL; GIB_ERR_MEMORY when too small or misaligned.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ *
+ * # Safety
+ * `memory` is NULL or points to `size` writable bytes; `out` is NULL or writable.
+ */
+int32_t gib_tilt_init_in(void *memory, uintptr_t size, struct gib_tilt **out);
+
+/**
+ * Makes an idle instance in memory that gib allocates.
+ *
+ * @return the handle, to be given to `gib_tilt_free`; NULL when there is no memory.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ */
+struct gib_tilt *gib_tilt_new(void);
+
+/**
+ * Frees an instance made by `gib_tilt_new`. NULL is allowed and does nothing.
+ *
+ * Take offsets that are in force out first: memory that is gone can ramp nothing.
+ *
+ * @param handle an instance from `gib_tilt_new`, never one from `gib_tilt_init_in`.
+ *
+ * [thread: setup] [real-time: no] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or came from `gib_tilt_new` and was not freed before.
+ */
+void gib_tilt_free(struct gib_tilt *handle);
+
+/**
+ * Checks configuration and table, and arms a measurement, which begins when the tool is in the cut.
+ *
+ * The rising edge of PLCopen's Execute. Clears the previous result and error.
+ *
+ * @param handle the instance.
+ * @param config how to measure and compensate; copied. Set `struct_size`, zero the rest, then set what you want.
+ * @param table the load table; copied. Not looked at, and may be NULL, when teaching.
+ * @return GIB_OK; GIB_ERR_CONFIG (gib_tilt_last_error names the field and its range), GIB_ERR_STRUCT_SIZE,
+ * GIB_ERR_TILT_TABLE for a table that is too short or does not rise, GIB_ERR_TILT_CONDITION for a table of another
+ * condition, GIB_ERR_STATE while busy, GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup, or cycle between steps] [real-time: yes] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `config` and `table` are NULL or point to their `struct_size` readable bytes.
+ */
+int32_t gib_tilt_start(struct gib_tilt *handle,
+                       const struct gib_tilt_config *config,
+                       const struct gib_tilt_table *table);
+
+/**
+ * One servo cycle. Call it in every cycle, also when idle: offsets are brought in, kept and taken out through it.
+ *
+ * Give commanded coordinates without gib's offsets, and add `offset_mm` and `offset_deg` to them. Set
+ * `GIB_TILT_INPUT_CUTTING` while the tool cuts at feed, and `GIB_TILT_INPUT_END` when the path is finished. When
+ * `warning` is 1, warn the operator; give `request_id` back in `acknowledged_id` to have the offsets brought in, set
+ * `GIB_TILT_INPUT_OFF` to decline. The same flag takes offsets out that are in force.
+ *
+ * @param handle the instance.
+ * @param input values of this cycle.
+ * @param output offsets for this cycle; always written when not NULL.
+ * @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
+ * GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_ACK_TIMEOUT, GIB_ERR_DEADLINE, GIB_ERR_TILT_...;
+ * and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `input` is NULL or readable; `output` is NULL or writable.
+ */
+int32_t gib_tilt_step(struct gib_tilt *handle,
+                      const struct gib_tilt_input *input,
+                      struct gib_tilt_output *output);
+
+/**
+ * Aborts: the next steps take the offsets out within their bounds of speed and acceleration, and end with
+ * GIB_ERR_ABORTED. Does nothing when not busy. To abort from another thread set `GIB_INPUT_ABORT` in the input.
+ *
+ * @param handle the instance.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance.
+ */
+int32_t gib_tilt_abort(struct gib_tilt *handle);
+
+/**
+ * Reads what was found: complete after GIB_DONE, else what is known so far.
+ *
+ * @param handle the instance.
+ * @param report receives it.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `report` is NULL or writable.
+ */
+int32_t gib_tilt_result(const struct gib_tilt *handle, struct gib_tilt_report *report);
+
+/**
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ *
+ * @param handle the instance.
+ * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `detail` is NULL or writable.
+ */
+int32_t gib_tilt_last_error(const struct gib_tilt *handle, struct gib_error_detail *detail);
+
+/**
+ * Adds a cut to a table: a new row in the order of depth, or a further cut of a depth that is there.
+ *
+ * @param table the table; its `struct_size` and `condition` are set.
+ * @param depth_mm depth of the cut, 0 to 1000 mm.
+ * @param load mean load of the cut, 0 to 1e9: the `load` of a report after teaching, or any other mean.
+ * @param load_std its standard uncertainty; 0: taken as exact.
+ * @param detail receives what was wrong; may be NULL.
+ * @return GIB_OK; GIB_ERR_CONFIG, GIB_ERR_TILT_TABLE when all rows are used, GIB_ERR_STRUCT_SIZE, GIB_ERR_NULL.
+ *
+ * [thread: setup] [real-time: yes] [state: none]
+ *
+ * # Safety
+ * `table` is NULL or points to a whole `gib_tilt_table`; `detail` is NULL or writable.
+ */
+int32_t gib_tilt_table_add(struct gib_tilt_table *table,
+                           double depth_mm,
+                           double load,
+                           double load_std,
+                           struct gib_error_detail *detail);
+
+/**
+ * Checks that a table can be measured with: two rows at least, depths and loads finite and rising, and the loads of
+ * neighbouring rows further apart than twice their uncertainties.
+ *
+ * @param table the table.
+ * @param detail receives what was wrong: the column, the value, and what it must be above; may be NULL.
+ * @return GIB_OK; GIB_ERR_TILT_TABLE, GIB_ERR_CONFIG, GIB_ERR_STRUCT_SIZE, GIB_ERR_NULL.
+ *
+ * [thread: setup] [real-time: yes] [state: none]
+ *
+ * # Safety
+ * `table` is NULL or points to its `struct_size` readable bytes; `detail` is NULL or writable.
+ */
+int32_t gib_tilt_table_check(const struct gib_tilt_table *table,
+                             struct gib_error_detail *detail);
+
+/**
+ * Writes a table to a file, JSON `gib.tilt_table/1`, with its condition; whole or not at all.
+ *
+ * @param table the table; one that gib_tilt_table_check refuses is not written.
+ * @param path the file, NUL-terminated; replaced when it is there.
+ * @param detail receives what was wrong; may be NULL.
+ * @return GIB_OK; GIB_ERR_IO, and as gib_tilt_table_check.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ *
+ * # Safety
+ * `table` is NULL or points to its `struct_size` readable bytes; `path` is NULL or NUL-terminated; `detail` is NULL or
+ * writable.
+ */
+int32_t gib_tilt_table_save(const struct gib_tilt_table *table,
+                            const char *path,
+                            struct gib_error_detail *detail);
+
+/**
+ * Reads a table from a file. The condition comes with it; gib_tilt_start compares it with that of the cut.
+ *
+ * @param table receives the table; unchanged on any error. Its `struct_size` is set by the caller.
+ * @param path the file, NUL-terminated.
+ * @param detail receives what was wrong; `field` is "line" where the text is not JSON; may be NULL.
+ * @return GIB_OK; GIB_ERR_IO, GIB_ERR_FORMAT, and as gib_tilt_table_check.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ *
+ * # Safety
+ * `table` is NULL or points to a whole `gib_tilt_table`; `path` is NULL or NUL-terminated; `detail` is NULL or writable.
+ */
+int32_t gib_tilt_table_load(struct gib_tilt_table *table,
+                            const char *path,
+                            struct gib_error_detail *detail);
+
+/**
+ * The published rule by itself: depths by straight interpolation at two positions, and the angle between.
+ *
+ * @param table the load table.
+ * @param position_mm two positions along the path, mm, at least 1 µm apart.
+ * @param load the load at each.
+ * @param result receives depths, angle and slope.
+ * @param detail receives what was wrong; may be NULL.
+ * @return GIB_OK; GIB_ERR_TILT_RANGE for a load outside the table, GIB_ERR_CONFIG, and as gib_tilt_table_check.
+ *
+ * [thread: any] [real-time: yes] [state: none]
+ *
+ * # Safety
+ * `table` is NULL or points to its `struct_size` readable bytes; `position_mm` and `load` are NULL or two numbers each;
+ * `result` and `detail` are NULL or writable.
+ */
+int32_t gib_tilt_two_point(const struct gib_tilt_table *table,
+                           const double *position_mm,
+                           const double *load,
+                           struct gib_tilt_two_point_result *result,
+                           struct gib_error_detail *detail);
 
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.

@@ -162,6 +162,20 @@ pub const GIB_ERR_CALIBRATION_CONDITION: i32 = -703;
 pub const GIB_ERR_CALIBRATION_ADD: i32 = -704;
 /// A gain is beyond 0.1 to 10: a sensor's unit or sign is wrong.
 pub const GIB_ERR_CALIBRATION_GAIN: i32 = -705;
+/// The load table is too short, full, or does not rise with the depth beyond its uncertainty.
+pub const GIB_ERR_TILT_TABLE: i32 = -500;
+/// The cut is of another machining condition than the load table.
+pub const GIB_ERR_TILT_CONDITION: i32 = -501;
+/// Too few readings of the load along the path.
+pub const GIB_ERR_TILT_DATA: i32 = -502;
+/// The load lies outside the table.
+pub const GIB_ERR_TILT_RANGE: i32 = -503;
+/// The offsets that undo the tilt are larger than allowed.
+pub const GIB_ERR_TILT_SIZE: i32 = -504;
+/// The depth along the path is no line or plane: too many outliers.
+pub const GIB_ERR_TILT_SHAPE: i32 = -505;
+/// The samples of the current fall on too few of its phases for a true RMS.
+pub const GIB_ERR_TILT_ALIAS: i32 = -506;
 
 /// Every status and the sentence that explains it.
 const TEXTS: &[(i32, &str)] = &[
@@ -241,6 +255,13 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_CALIBRATION_CONDITION, "the displacements are too near to opposite phase for the published formula\0"),
     (GIB_ERR_CALIBRATION_ADD, "the experiment cannot be added: too many, or other frequencies\0"),
     (GIB_ERR_CALIBRATION_GAIN, "a gain is beyond 0.1 to 10: a sensor's unit or sign is wrong\0"),
+    (GIB_ERR_TILT_TABLE, "the load table is too short, full, or does not rise with the depth\0"),
+    (GIB_ERR_TILT_CONDITION, "the cut is of another machining condition than the load table\0"),
+    (GIB_ERR_TILT_DATA, "too few readings of the load along the path\0"),
+    (GIB_ERR_TILT_RANGE, "the load lies outside the table\0"),
+    (GIB_ERR_TILT_SIZE, "the offsets that undo the tilt are larger than allowed\0"),
+    (GIB_ERR_TILT_SHAPE, "the depth along the path is no line or plane\0"),
+    (GIB_ERR_TILT_ALIAS, "the samples of the current fall on too few of its phases\0"),
 ];
 
 /// The text of a status, NUL-terminated and static; for an unknown number a text that says so.

@@ -11,6 +11,7 @@ use super::inertia::*;
 use super::program::*;
 use super::recorder::*;
 use super::speed_variation::*;
+use super::tilt::*;
 use super::types::GibErrorDetail;
 use super::vibration::*;
 use super::{GIB_ABI_VERSION, gib_abi_version, gib_status_text, gib_version};
@@ -28,6 +29,10 @@ use crate::cycle::inertia::io::{InertiaInput, InertiaOutput};
 use crate::cycle::inertia::report::InertiaReport;
 use crate::cycle::speed_variation::config::{SpeedVariationConfig, SpeedVariationLimits};
 use crate::cycle::speed_variation::io::{SpeedVariationInput, SpeedVariationOutput};
+use crate::cycle::tilt::config::TiltConfig;
+use crate::cycle::tilt::io::{TiltInput, TiltOutput};
+use crate::cycle::tilt::table::{TiltTable, TiltTwoPointResult};
+use crate::cycle::tilt::verdict::TiltReport;
 use crate::cycle::vibration::config::VibrationConfig;
 use crate::cycle::vibration::io::{VibrationInput, VibrationOutput, VibrationReport};
 use core::ffi::{c_char, c_void};
@@ -259,6 +264,49 @@ pub struct GibApiTable {
     pub calibration_load: unsafe extern "C" fn(handle: *mut GibCalibration, path: *const c_char) -> i32,
     /// See gib_calibration_last_error.
     pub calibration_last_error: unsafe extern "C" fn(handle: *const GibCalibration, detail: *mut GibErrorDetail) -> i32,
+    /// See gib_tilt_size.
+    pub tilt_size: extern "C" fn() -> usize,
+    /// See gib_tilt_init_in.
+    pub tilt_init_in: unsafe extern "C" fn(memory: *mut c_void, size: usize, out: *mut *mut GibTilt) -> i32,
+    /// See gib_tilt_new.
+    pub tilt_new: extern "C" fn() -> *mut GibTilt,
+    /// See gib_tilt_free.
+    pub tilt_free: unsafe extern "C" fn(handle: *mut GibTilt),
+    /// See gib_tilt_start.
+    pub tilt_start:
+        unsafe extern "C" fn(handle: *mut GibTilt, config: *const TiltConfig, table: *const TiltTable) -> i32,
+    /// See gib_tilt_step.
+    pub tilt_step: unsafe extern "C" fn(handle: *mut GibTilt, input: *const TiltInput, output: *mut TiltOutput) -> i32,
+    /// See gib_tilt_abort.
+    pub tilt_abort: unsafe extern "C" fn(handle: *mut GibTilt) -> i32,
+    /// See gib_tilt_result.
+    pub tilt_result: unsafe extern "C" fn(handle: *const GibTilt, report: *mut TiltReport) -> i32,
+    /// See gib_tilt_last_error.
+    pub tilt_last_error: unsafe extern "C" fn(handle: *const GibTilt, detail: *mut GibErrorDetail) -> i32,
+    /// See gib_tilt_table_add.
+    pub tilt_table_add: unsafe extern "C" fn(
+        table: *mut TiltTable,
+        depth_mm: f64,
+        load: f64,
+        load_std: f64,
+        detail: *mut GibErrorDetail,
+    ) -> i32,
+    /// See gib_tilt_table_check.
+    pub tilt_table_check: unsafe extern "C" fn(table: *const TiltTable, detail: *mut GibErrorDetail) -> i32,
+    /// See gib_tilt_table_save.
+    pub tilt_table_save:
+        unsafe extern "C" fn(table: *const TiltTable, path: *const c_char, detail: *mut GibErrorDetail) -> i32,
+    /// See gib_tilt_table_load.
+    pub tilt_table_load:
+        unsafe extern "C" fn(table: *mut TiltTable, path: *const c_char, detail: *mut GibErrorDetail) -> i32,
+    /// See gib_tilt_two_point.
+    pub tilt_two_point: unsafe extern "C" fn(
+        table: *const TiltTable,
+        position_mm: *const f64,
+        load: *const f64,
+        result: *mut TiltTwoPointResult,
+        detail: *mut GibErrorDetail,
+    ) -> i32,
 }
 
 static API: GibApiTable = GibApiTable {
@@ -355,6 +403,20 @@ static API: GibApiTable = GibApiTable {
     calibration_save: gib_calibration_save,
     calibration_load: gib_calibration_load,
     calibration_last_error: gib_calibration_last_error,
+    tilt_size: gib_tilt_size,
+    tilt_init_in: gib_tilt_init_in,
+    tilt_new: gib_tilt_new,
+    tilt_free: gib_tilt_free,
+    tilt_start: gib_tilt_start,
+    tilt_step: gib_tilt_step,
+    tilt_abort: gib_tilt_abort,
+    tilt_result: gib_tilt_result,
+    tilt_last_error: gib_tilt_last_error,
+    tilt_table_add: gib_tilt_table_add,
+    tilt_table_check: gib_tilt_table_check,
+    tilt_table_save: gib_tilt_table_save,
+    tilt_table_load: gib_tilt_table_load,
+    tilt_two_point: gib_tilt_two_point,
 };
 
 /// The table of all functions, so that `dlsym` needs one name: "gib_api".

@@ -15,6 +15,7 @@ pub mod program;
 pub mod recorder;
 pub mod shared_memory;
 pub mod speed_variation;
+pub mod tilt;
 pub mod types;
 pub mod vibration;
 

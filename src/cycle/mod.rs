@@ -12,5 +12,6 @@ pub mod level;
 pub mod profile;
 pub mod recorder;
 pub mod speed_variation;
+pub mod tilt;
 pub mod turns;
 pub mod vibration;

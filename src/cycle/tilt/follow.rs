@@ -1,0 +1,111 @@
+//! An offset that follows its target with bounded speed and acceleration.
+//!
+//! The target may jump (offsets switched on or off) or move (z along the path). It is met in the first cycle in which a
+//! step onto it keeps both bounds; until then the offset closes in with the speed of the target and what can still be
+//! braked over the distance e: v·(v + a) ≤ 2·a·e.
+
+/// Largest step and largest change of step, in the unit of the offset, per cycle and per cycle².
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// Largest step a cycle.
+    pub speed: f64,
+    /// Largest change of the step a cycle.
+    pub acceleration: f64,
+}
+
+/// One offset.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Follower {
+    /// The offset now.
+    pub value: f64,
+    /// Its last step.
+    pub rate: f64,
+    /// Target of the cycle before.
+    target: f64,
+}
+
+impl Follower {
+    /// Steps onto the target when that keeps the bounds; else false, and nothing is changed.
+    #[inline(always)]
+    pub fn meets(&mut self, target: f64, bounds: &Bounds) -> bool {
+        let step = target - self.value;
+        let meets = step.abs() <= bounds.speed && (step - self.rate).abs() <= bounds.acceleration;
+        if meets {
+            *self = Follower { value: target, rate: step, target };
+        }
+        meets
+    }
+
+    /// One cycle toward a finite target. True when the offset is there.
+    pub fn step(&mut self, target: f64, bounds: &Bounds) -> bool {
+        if self.meets(target, bounds) {
+            return true;
+        }
+        let (v, a) = (bounds.speed, bounds.acceleration);
+        let (left, own) = (target - self.value, target - self.target);
+        // A jump of the target is no motion to go along with.
+        let own = if own.abs() <= v { own } else { 0.0 };
+        let stops = (0.25 * a * a + 2.0 * a * (left - own).abs()).sqrt() - 0.5 * a;
+        let wanted = own + stops.copysign(left - own);
+        self.rate = wanted.max(self.rate - a).min(self.rate + a).max(-v).min(v);
+        self.value += self.rate;
+        self.target = target;
+        false
+    }
+
+    /// At rest on the target of the last step.
+    #[must_use]
+    pub fn rests(&self) -> bool {
+        self.rate == 0.0 && self.value == self.target
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Bounds hold whatever the target does, and a target that rests is reached in time.
+        #[test]
+        fn keeps_its_bounds_and_arrives(
+            goals in prop::collection::vec(-5.0..5.0f64, 1..6),
+            v in 1e-4..0.05f64, a in 1e-6..1e-3f64, slope in -1e-3..1e-3f64, change in 1usize..300,
+        ) {
+            let bounds = Bounds { speed: v, acceleration: a };
+            let mut f = Follower::default();
+            let follow = |f: &mut Follower, target: f64| -> Result<bool, TestCaseError> {
+                let before = *f;
+                let there = f.step(target, &bounds);
+                prop_assert!(f.rate.abs() <= v * 1.000001, "speed {} of {v}", f.rate);
+                prop_assert!((f.rate - before.rate).abs() <= a * 1.000001, "change {} of {a}", f.rate - before.rate);
+                prop_assert!((f.value - before.value - f.rate).abs() < 1e-12);
+                Ok(there)
+            };
+            for goal in &goals {
+                for i in 0..change {
+                    follow(&mut f, goal + slope * i as f64)?;
+                }
+            }
+            let goal = goals[0];
+            let bound = ((goal - f.value).abs() / v + 8.0 * v / a + 2.0 * (40.0 / a).sqrt() + 50.0) as usize;
+            let mut cycles = 0;
+            while !(follow(&mut f, goal)? && f.rests()) {
+                cycles += 1;
+                prop_assert!(cycles <= bound, "not there after {cycles}: {f:?}");
+            }
+        }
+
+        /// A target in slow motion is met, and then followed without lag.
+        #[test]
+        fn meets_a_moving_target(speed in -0.004..0.004f64, a in 1e-5..1e-3f64) {
+            let bounds = Bounds { speed: 0.01, acceleration: a };
+            let mut f = Follower::default();
+            let mut met = 0;
+            for i in 0..20000 {
+                met = if f.step(1.0 + speed * i as f64, &bounds) { met + 1 } else { 0 };
+            }
+            prop_assert!(met > 100, "met only for {met} cycles");
+        }
+    }
+}
