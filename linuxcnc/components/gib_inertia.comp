@@ -15,6 +15,7 @@ include "gib.h";
 
 pin in float speed_cmd "from spindle.N.speed-out, rpm, signed";
 pin out float drive_speed_cmd "speed that the drive shall follow, rpm, signed";
+pin out float torque_ff "torque that the commanded change of speed takes, to the drive's feed-forward where it has one, N m";
 pin in float drive_speed "measured speed, rpm, signed";
 pin in float motor_torque "spindle torque from the drive, N m, positive toward positive speed";
 pin in bit drive_fault "the drive is faulted";
@@ -99,6 +100,7 @@ static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
     return gib_inertia_start(gib, &config);
 }
 
+/* Begins with next to nothing: the cycles then ask for the amplitude wanted, and get what the motor can do. */
 static int32_t begin_to_vary(struct __comp_state *__comp_inst, double cycle_s)
 {
     gib_speed_variation_config config;
@@ -106,7 +108,7 @@ static int32_t begin_to_vary(struct __comp_state *__comp_inst, double cycle_s)
     config.struct_size = sizeof config;
     config.cycle_s = cycle_s;
     config.speed_rpm = speed_cmd;
-    config.amplitude_ratio = amplitude;
+    config.amplitude_ratio = 1e-4;
     config.period_s = swing_time;
     config.inertia_kg_m2 = ina;
     config.own_inertia_kg_m2 = own_inertia;
@@ -181,6 +183,7 @@ static double varied(struct __comp_state *__comp_inst, double cycle_s)
         varying = status == GIB_BUSY;
         vary_message = swing.message;
     }
+    torque_ff = varying ? swing.torque_nm : 0.0;
     amplitude_now = varying ? swing.amplitude_ratio : 0.0;
     amplitude_most = swing.amplitude_limit_ratio;
     /* A stop is a stop, whatever is still to be wound down. */

@@ -6,6 +6,7 @@ A plant to try gib on without a machine:
   J dw/dt = T - Tc sign(w) - B w - cutting      T from a PI speed servo, limited by torque and by power
 """;
 pin in float speed_cmd "commanded speed, rpm, signed";
+pin in float torque_ff "feed-forward, N m";
 pin in bit enable "power";
 pin in float cutting "torque that a cut takes, N m";
 pin out float speed "measured speed, rpm, signed";
@@ -57,7 +58,7 @@ FUNCTION(_)
     double cycle = period * 1e-9, dt = cycle / SUBSTEPS, limit, error, wanted, limited, before;
     int i;
     error = speed_cmd * TURN / 60.0 - w;
-    wanted = inertia * BANDWIDTH * (error + integral);
+    wanted = inertia * BANDWIDTH * (error + integral) + torque_ff;
     limit = fmin(torque_limit, power_limit / fmax(fabs(w), 1.0));
     limited = fmin(fmax(wanted, -limit), limit);
     if (!enable) {
