@@ -55,6 +55,7 @@ param rw float return_speed = 5 "speed at which the axis comes back afterwards, 
 variable gib_backlash *gib;
 variable gib_backlash_output out;
 variable double drive_safe = 0.0;
+variable double cmd_safe = 0.0;
 variable double back = 0.0;
 variable int wait = 0;
 variable unsigned asked = 0;
@@ -89,6 +90,16 @@ EXTRA_CLEANUP()
     for (__comp_inst = __comp_first_inst; __comp_inst; __comp_inst = __comp_inst->_next) {
         gib_backlash_free(gib);
     }
+}
+
+/* Takes a value over when it is a number; whether it is. */
+static int held(double value, double *safe)
+{
+    if (!isfinite(value)) {
+        return 0;
+    }
+    *safe = value;
+    return 1;
 }
 
 static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
@@ -131,11 +142,7 @@ FUNCTION(_)
     if (!enable) {
         fault = 0;
     }
-    if (isfinite(drive_fb)) {
-        drive_safe = drive_fb;
-    } else {
-        fault = GIB_ERR_NON_FINITE;
-    }
+    fault = held(drive_fb, &drive_safe) && held(position_cmd, &cmd_safe) ? fault : GIB_ERR_NON_FINITE;
     if (start && !started && enable && !busy && !fault) {
         status = begin(__comp_inst, period * 1e-9);
         done = 0;
@@ -165,22 +172,22 @@ FUNCTION(_)
     if (running && status != GIB_BUSY) {
         running = 0;
         done = status == GIB_DONE;
-        fault = status == GIB_ERR_NON_FINITE ? status : 0;
+        fault = status == GIB_ERR_NON_FINITE ? status : fault;
         report_it(__comp_inst, status);
     }
 
     if (out.owns_motion) {
         drive_cmd = out.target_position_mm;
-        back = out.target_position_mm - position_cmd;
-        position_fb = position_cmd;
+        back = out.target_position_mm - cmd_safe;
+        position_fb = cmd_safe;
     } else if (back != 0.0) {
         /* The axis stands elsewhere than motion knows: it glides back. */
         double step = return_speed * period * 1e-9;
         back = fabs(back) <= step || !enable ? 0.0 : back - copysign(step, back);
-        drive_cmd = position_cmd + back;
-        position_fb = enable ? position_cmd : drive_safe;
+        drive_cmd = cmd_safe + back;
+        position_fb = enable ? cmd_safe : drive_safe;
     } else {
-        drive_cmd = isfinite(position_cmd) ? position_cmd : drive_cmd;
+        drive_cmd = cmd_safe;
         position_fb = drive_safe;
         busy = running;
     }

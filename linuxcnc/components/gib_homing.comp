@@ -49,6 +49,7 @@ variable gib_homing *gib;
 variable gib_homing_output out;
 variable double offset = 0.0;
 variable double drive_safe = 0.0;
+variable double cmd_safe = 0.0;
 variable int owned = 0;
 variable int fault = 0;
 
@@ -75,6 +76,16 @@ EXTRA_CLEANUP()
     for (__comp_inst = __comp_first_inst; __comp_inst; __comp_inst = __comp_inst->_next) {
         gib_homing_free(gib);
     }
+}
+
+/* Takes a value over when it is a number; whether it is. */
+static int held(double value, double *safe)
+{
+    if (!isfinite(value)) {
+        return 0;
+    }
+    *safe = value;
+    return 1;
 }
 
 static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
@@ -108,11 +119,7 @@ FUNCTION(_)
     if (!enable) {
         fault = 0;
     }
-    if (isfinite(drive_fb)) {
-        drive_safe = drive_fb;
-    } else {
-        fault = GIB_ERR_NON_FINITE;
-    }
+    fault = held(drive_fb, &drive_safe) && held(position_cmd, &cmd_safe) ? fault : GIB_ERR_NON_FINITE;
     if (index_enable && enable && !busy && !fault) {
         status = begin(__comp_inst, period * 1e-9);
         fault = status < 0 ? status : 0;
@@ -129,15 +136,15 @@ FUNCTION(_)
 
     if (out.owns_motion) {
         drive_cmd = out.target_position_mm[0];
-        position_fb = position_cmd;
+        position_fb = cmd_safe;
         owned = 1;
     } else {
         if (owned) {
             /* Motion goes on where gib has put the axis. */
-            offset = position_cmd - out.target_position_mm[0];
+            offset = cmd_safe - out.target_position_mm[0];
             owned = 0;
         }
-        drive_cmd = isfinite(position_cmd) ? position_cmd - offset : drive_cmd;
+        drive_cmd = cmd_safe - offset;
         position_fb = drive_safe + offset;
     }
     torque_limit_cmd = out.request_id ? out.torque_limit : torque_limit_normal;

@@ -7,6 +7,7 @@ a compensation that did nothing fails, and so does one that works too well to be
 import csv
 import glob
 import json
+import math
 import os
 import subprocess
 import sys
@@ -268,7 +269,52 @@ def diagnosed():
     check(abs(slope / truth - 1) < 0.05, f"gib diagnose names {sorted(findings)}; cable {slope:.4f} N m/mm, truth {truth}")
 
 
-TESTS = [homing, inertia_and_variation, lost_motion_measured, abort_restores, diagnosed]
+def refused():
+    """What the machine is not ready for is refused with the reason, and nothing has moved."""
+    time.sleep(0.5)
+
+    def refuses(line, reason):
+        where = [pin(f"gib-sim-axis.{joint}.drive-fb") for joint in range(3)]
+        mdi(line)
+        text = told()
+        moved = max(abs(pin(f"gib-sim-axis.{joint}.drive-fb") - where[joint]) for joint in range(3))
+        check(reason in text and moved < 0.01, f"{line} is refused, nothing has moved ({1e3 * moved:.1f} um): {text}")
+    refuses("M110 P7", "no joint 7")
+    refuses("M110", "P is missing")
+    refuses("M112", "no program is loaded")
+    refuses("M113 P10 Q2", "inertia is not known")
+    refuses("M116", "no recording runs")
+    mdi("M3 S300")
+    refuses("M110 P0", "spindle turns")
+    mdi("M5")
+
+
+def no_number_reaches_motion():
+    """The encoder reads no number in the middle of a move: the control is off at once and never sees it."""
+    mdi("G0 Z10")
+    seen = []
+    command.mdi("G1 Z30 F600")
+    wait(lambda: pin("joint.2.pos-cmd") > 15, 10, "the move")
+    before = pin("joint.2.motor-pos-fb")
+    hal.set_p("gib-sim-axis.2.break-encoder", "1")
+    started = time.monotonic()
+    while time.monotonic() < started + 1:
+        seen.append((pin("joint.2.motor-pos-fb"), pin("gib-sim-axis.2.drive-cmd"), pin("gib-inertia.0.ok")))
+        if not pin("gib-inertia.0.ok") and state().task_state != linuxcnc.STATE_ON:
+            break
+    check(pin("gib-sim-axis.2.drive-fb") != pin("gib-sim-axis.2.drive-fb"), "the plant's encoder reads no number")
+    check(all(math.isfinite(v) for row in seen for v in row[:2]), f"motion and drive see numbers only ({len(seen)} looks)")
+    check(stat.task_state != linuxcnc.STATE_ON and not pin("gib-inertia.0.ok"),
+          f"the machine is off after {1e3 * (time.monotonic() - started):.0f} ms, ok is down; {told()}")
+    check(abs(pin("joint.2.motor-pos-fb") - before) < 0.5, "the last position is held")
+    hal.set_p("gib-sim-axis.2.break-encoder", "0")
+    time.sleep(0.1)
+    machine_on()
+    mdi("G1 Z5 F1200")
+    check(abs(pin("joint.2.pos-fb") - 5) < 0.01, f"and works again when the encoder does; {told()}")
+
+
+TESTS = [homing, refused, inertia_and_variation, lost_motion_measured, abort_restores, diagnosed, no_number_reaches_motion]
 
 
 def main(names):
