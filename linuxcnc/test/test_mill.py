@@ -9,6 +9,7 @@ import glob
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -93,6 +94,11 @@ def lost_motion(joint):
     return 1e3 * (pin(of + "clearance") + 2 * on_table / pin(of + "stiffness"))
 
 
+def amounts_kept():
+    with open("gib-amounts.json", encoding="utf-8") as file:
+        return json.load(file)
+
+
 def columns(path, *names):
     with open(path, encoding="utf-8") as file:
         rows = csv.DictReader(line for line in file if not line.startswith("#"))
@@ -144,12 +150,12 @@ def lost_motion_measured():
     before = reversal_error("X")
     truth = lost_motion(0)
     check(0.9 * truth < before < 1.1 * truth + 5, f"uncompensated reversal error {before:.1f} um, lost motion {truth:.1f}")
+    hal.set_p("gib-backlash.0.reversals", "2")
     mdi("M110 P0", 90)
     text = told()
     amount = 1e3 * pin("ini.0.backlash")
     check(abs(amount - truth) < 3, f"ini.0.backlash is {amount:.1f} um, truth {truth:.1f}; {text}")
-    with open("gib-amounts.json", encoding="utf-8") as file:
-        kept = json.load(file)
+    kept = amounts_kept()
     check(abs(1e3 * kept["joints"]["0"] - amount) < 0.01 and not kept["unfinished"], f"it is kept for the next start: {kept}")
     after = reversal_error("X")
     check(abs(after) < 0.1 * before, f"reversal error at the table {before:.1f} -> {after:.1f} um")
@@ -170,8 +176,7 @@ def abort_restores():
     wait(lambda: pin("ini.0.backlash") == amount, 5, "the amount of before is back")
     wait(idle, 10, "idle")
     time.sleep(0.5)
-    with open("gib-amounts.json", encoding="utf-8") as file:
-        kept = json.load(file)
+    kept = amounts_kept()
     check(kept["joints"]["0"] == amount and not kept["unfinished"], f"nothing is left half done: {kept}; {told()}")
     check(abs(pin("gib-backlash.0.drive-cmd") - where) < 0.1, "the axis is back where motion knows it")
 
@@ -253,7 +258,7 @@ def speed_varies(recording):
 def diagnosed():
     """The plant's y axis has a cable chain that the belief, machine.json, knows nothing of."""
     def moves():
-        for feed, to in ((3000, 150), (1500, 20), (600, 60), (2400, 10), (2000, 100), (3000, 5)):
+        for feed, to in ((3000, 150), (1500, 20), (1000, 60), (2400, 10), (2000, 100), (3000, 5)):
             mdi(f"G1 Y{to} F{feed}")
     path = recorded(moves)
     gib = os.environ["GIB"]
@@ -314,14 +319,52 @@ def no_number_reaches_motion():
     check(abs(pin("joint.2.pos-fb") - 5) < 0.01, f"and works again when the encoder does; {told()}")
 
 
+def killed(phase):
+    """The real-time process dies in that phase of a measurement. What was in force before stands in a note."""
+    for joint in range(3):
+        hal.set_p(f"gib-homing.{joint}.touch-count", "1")
+    machine_on()
+    home_all()
+    before = pin("ini.0.backlash")
+    check(before > 0.05, f"{1e3 * before:.1f} um from the first run is in force")
+    hal.set_p("gib-backlash.0.reversals", "1")
+    mdi("M115")
+    command.mdi("M110 P0")
+    wait(lambda: pin("gib-backlash.0.state") == int(phase), 60, f"phase {phase}")
+    in_force = pin("ini.0.backlash")
+    os.kill(int(subprocess.run(["pgrep", "-x", "rtapi_app"], capture_output=True, text=True, check=True).stdout),
+            signal.SIGKILL)
+    check(True, f"rtapi_app killed in phase {phase} with {1e3 * in_force:.1f} um in force")
+    time.sleep(4)
+    kept = amounts_kept()
+    check(kept["unfinished"]["0"]["amount_mm"] == before, f"the note stands: {kept}; {told()}")
+    recording = max(glob.glob("gib-*.csv"))
+    inspected = subprocess.run([os.environ["GIB"], "inspect", recording], capture_output=True, text=True, check=False)
+    check(inspected.returncode == 0, f"the recording made meanwhile is read: {inspected.stdout.splitlines()[1:2]}")
+
+
+def restarted():
+    """The amount of before is in force, and the operator is told."""
+    kept = amounts_kept()["joints"]["0"]
+    texts = []
+    wait(lambda: texts.append(told()) or "did not end" in "".join(texts), 10, "the operator is told")
+    check(abs(pin("ini.0.backlash") - kept) < 1e-9, f"told: {''.join(texts)}")
+    wait(lambda: not amounts_kept()["unfinished"], 2, "told once")
+
+
 TESTS = [homing, refused, inertia_and_variation, lost_motion_measured, abort_restores, diagnosed, no_number_reaches_motion]
 
 
 def main(names):
-    """All tests, or those named, after homing."""
-    for test in TESTS:
-        if not names or test is homing or test.__name__ in names:
-            test()
+    """All tests of one run, or those named, after homing; or what a run is killed in, or what one finds that was."""
+    if names[:1] == ["killed"]:
+        killed(names[1])
+    elif names == ["restarted"]:
+        restarted()
+    else:
+        for test in TESTS:
+            if not names or test is homing or test.__name__ in names:
+                test()
     print("test: all passed", flush=True)
 
 
