@@ -7,7 +7,8 @@
  *   Each function of the machine is one family: gib_backlash_..., and so on. An axis or a spindle is one instance.
  *   Two instances share nothing; there is no global state.
  *
- *     memory     gib_<family>_new / _free, or _size and _init_in for memory of your own
+ *     memory     gib_<family>_new / _free, or _size and _init_in for memory of your own (machine and diagnosis own
+ *                memory of theirs: _new alone)
  *     _start     setup: takes the configuration; the rising edge of PLCopen's Execute
  *     _step      once per servo cycle: measured values in, commands out; returns GIB_BUSY until it returns
  *                GIB_DONE or an error. Done, aborted and error exclude one another
@@ -472,6 +473,16 @@
  * The samples of the current fall on too few of its phases for a true RMS.
  */
 #define GIB_ERR_TILT_ALIAS (-506)
+
+/**
+ * The machine has no axis of that name, or shares none with the recording.
+ */
+#define GIB_ERR_DIAGNOSIS_AXIS (-1200)
+
+/**
+ * The second recording cannot serve to measure the gain.
+ */
+#define GIB_ERR_DIAGNOSIS_HOLDOUT (-1201)
 
 /**
  * Slow-feed mode (default): the motor is fed slowly and the torque read in every cycle. The more accurate one.
@@ -1188,6 +1199,31 @@
 #define GIB_ABI_VERSION 1
 
 /**
+ * The machine does what the simulation believes.
+ */
+#define GIB_DIAGNOSIS_NO_DISCREPANCY 0
+
+/**
+ * The named causes explain the discrepancy down to the noise.
+ */
+#define GIB_DIAGNOSIS_EXPLAINED 1
+
+/**
+ * The named causes explain most of the discrepancy.
+ */
+#define GIB_DIAGNOSIS_PARTLY_EXPLAINED 2
+
+/**
+ * The simulation is wrong, and no known cause fits.
+ */
+#define GIB_DIAGNOSIS_UNKNOWN_CAUSE 3
+
+/**
+ * The recording does not suffice; the JSON says what is missing.
+ */
+#define GIB_DIAGNOSIS_INSUFFICIENT_DATA 4
+
+/**
  * Spell a new value as the program's own dialect is recognised.
  */
 #define GIB_PROGRAM_DIALECT_DETECT 0
@@ -1223,6 +1259,11 @@ typedef struct gib_backlash gib_backlash;
 typedef struct gib_calibration gib_calibration;
 
 /**
+ * A diagnosis of one axis. Opaque; it owns memory of its own, so that it comes from `gib_diagnosis_new` alone.
+ */
+typedef struct gib_diagnosis gib_diagnosis;
+
+/**
  * Homing of one axis, of one motor or two. Opaque; its size is `gib_homing_size()`.
  */
 typedef struct gib_homing gib_homing;
@@ -1231,6 +1272,11 @@ typedef struct gib_homing gib_homing;
  * An inertia measurement of one spindle. Opaque; its size is `gib_inertia_size()`.
  */
 typedef struct gib_inertia gib_inertia;
+
+/**
+ * A machine file in memory. Opaque; it owns memory of its own, so that it comes from `gib_machine_new` alone.
+ */
+typedef struct gib_machine gib_machine;
 
 /**
  * Reads and writes part programs, and keeps why the last call failed. Opaque; its size is `gib_program_size()`.
@@ -1876,6 +1922,76 @@ typedef struct gib_calibration_table {
  * Size of the struct in the first published ABI.
  */
 #define gib_calibration_table_FIRST_SIZE 3336
+
+/**
+ * What is to be diagnosed. Zero it, set `struct_size`, then `machine` and `recording`.
+ */
+typedef struct gib_diagnosis_config {
+    /**
+     * `sizeof(gib_diagnosis_config)`.
+     */
+    uint32_t struct_size;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+    /**
+     * What the simulation believes; is copied.
+     */
+    const struct gib_machine *machine;
+    /**
+     * Path of the recording, NUL-terminated.
+     */
+    const char *recording;
+    /**
+     * Path of a second recording, not used for fitting, on which the gain is measured; NULL or "" for none: then it
+     * is measured on blocks of the first that are held out.
+     */
+    const char *holdout;
+    /**
+     * Name of the axis; NULL or "" for the first that machine and recording share.
+     */
+    const char *axis;
+} gib_diagnosis_config;
+
+/**
+ * Told how far a diagnosis is; answers 0 to go on, anything else to stop.
+ *
+ * It is called from threads that gib starts for the work, one call at a time; it must return, and may call
+ * gib_diagnosis_abort and no other function of that instance.
+ *
+ * @param user what was given to gib_diagnosis_step.
+ * @param share of the work that is done, 0 to 1, never falling.
+ * @param stage what is being done, in a few words; valid during the call.
+ */
+typedef int32_t (*gib_diagnosis_progress)(void *user, double share, const char *stage);
+
+/**
+ * What a diagnosis came to; the JSON has all of it.
+ */
+typedef struct gib_diagnosis_report {
+    /**
+     * `GIB_DIAGNOSIS_…`.
+     */
+    int32_t verdict;
+    /**
+     * Number of causes named.
+     */
+    uint32_t findings;
+    /**
+     * RMS of measured minus predicted torque on rows that were not fitted, unfiltered, as believed; N·m, or N for a linear
+     * drive; 0 where not judged.
+     */
+    double residual_before;
+    /**
+     * The same with what was found.
+     */
+    double residual_after;
+    /**
+     * Noise floor of that residual below the frequency up to which it is judged, in the same unit.
+     */
+    double noise;
+} gib_diagnosis_report;
 
 /**
  * How to home. Zero in a field means its default; fields marked "required" have none.
@@ -3826,6 +3942,80 @@ typedef struct gib_api_table {
                               const double *load,
                               struct gib_tilt_two_point_result *result,
                               struct gib_error_detail *detail);
+    /**
+     * See gib_machine_new.
+     */
+    struct gib_machine *(*machine_new)(void);
+    /**
+     * See gib_machine_free.
+     */
+    void (*machine_free)(struct gib_machine *handle);
+    /**
+     * See gib_machine_read.
+     */
+    int32_t (*machine_read)(struct gib_machine *handle, const char *json, uintptr_t length);
+    /**
+     * See gib_machine_load.
+     */
+    int32_t (*machine_load)(struct gib_machine *handle, const char *path);
+    /**
+     * See gib_machine_save.
+     */
+    int32_t (*machine_save)(struct gib_machine *handle, const char *path);
+    /**
+     * See gib_machine_result.
+     */
+    int32_t (*machine_result)(const struct gib_machine *handle, char *json, uintptr_t size, uintptr_t *needed);
+    /**
+     * See gib_machine_ignored_keys.
+     */
+    int32_t (*machine_ignored_keys)(const struct gib_machine *handle,
+                                    char *text,
+                                    uintptr_t size,
+                                    uintptr_t *needed);
+    /**
+     * See gib_machine_last_error_text.
+     */
+    int32_t (*machine_last_error_text)(const struct gib_machine *handle, char *text, uintptr_t size);
+    /**
+     * See gib_diagnosis_new.
+     */
+    struct gib_diagnosis *(*diagnosis_new)(void);
+    /**
+     * See gib_diagnosis_free.
+     */
+    void (*diagnosis_free)(struct gib_diagnosis *handle);
+    /**
+     * See gib_diagnosis_start.
+     */
+    int32_t (*diagnosis_start)(struct gib_diagnosis *handle, const struct gib_diagnosis_config *config);
+    /**
+     * See gib_diagnosis_step.
+     */
+    int32_t (*diagnosis_step)(struct gib_diagnosis *handle, gib_diagnosis_progress progress, void *user);
+    /**
+     * See gib_diagnosis_abort.
+     */
+    int32_t (*diagnosis_abort)(struct gib_diagnosis *handle);
+    /**
+     * See gib_diagnosis_result.
+     */
+    int32_t (*diagnosis_result)(const struct gib_diagnosis *handle, struct gib_diagnosis_report *report);
+    /**
+     * See gib_diagnosis_json.
+     */
+    int32_t (*diagnosis_json)(const struct gib_diagnosis *handle,
+                              char *json,
+                              uintptr_t size,
+                              uintptr_t *needed);
+    /**
+     * See gib_diagnosis_machine.
+     */
+    int32_t (*diagnosis_machine)(const struct gib_diagnosis *handle, struct gib_machine *machine);
+    /**
+     * See gib_diagnosis_last_error_text.
+     */
+    int32_t (*diagnosis_last_error_text)(const struct gib_diagnosis *handle, char *text, uintptr_t size);
 } gib_api_table;
 
 #ifdef __cplusplus
@@ -4232,6 +4422,152 @@ int32_t gib_calibration_load(struct gib_calibration *handle,
 int32_t gib_calibration_last_error(const struct gib_calibration *handle, struct gib_error_detail *detail);
 
 /**
+ * Makes an empty instance.
+ *
+ * @return the handle, to be given to `gib_diagnosis_free`; NULL when there is no memory.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ */
+struct gib_diagnosis *gib_diagnosis_new(void);
+
+/**
+ * Frees an instance. NULL is allowed and does nothing.
+ *
+ * @param handle an instance from `gib_diagnosis_new`, in use by no call.
+ *
+ * [thread: setup] [real-time: no] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or came from `gib_diagnosis_new` and was not freed before.
+ */
+void gib_diagnosis_free(struct gib_diagnosis *handle);
+
+/**
+ * Takes the configuration and reads the recordings; `gib_diagnosis_step` then does the work.
+ *
+ * Recordings are read here, on the calling thread: never call it from a servo thread.
+ *
+ * @param handle the instance; an earlier result is forgotten.
+ * @param config what to diagnose; nothing of it is kept.
+ * @return GIB_OK; GIB_ERR_IO or GIB_ERR_FORMAT for a recording (gib_diagnosis_last_error_text names file, row and
+ * column), GIB_ERR_DIAGNOSIS_AXIS, GIB_ERR_DIAGNOSIS_HOLDOUT, GIB_ERR_STRUCT_SIZE; GIB_ERR_STATE when no machine was
+ * read or another thread works; GIB_ERR_NULL, GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
+ *
+ * [thread: setup] [real-time: no] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `config` is NULL or points to `struct_size` bytes whose pointers are NULL or as
+ * said there.
+ */
+int32_t gib_diagnosis_start(struct gib_diagnosis *handle,
+                            const struct gib_diagnosis_config *config);
+
+/**
+ * Does the whole work, and returns when it is done or stopped: seconds for a minute of recording. It starts threads
+ * of its own for the time of the call, with the scheduling of the calling thread: never call it from a servo thread.
+ *
+ * @param handle the instance.
+ * @param progress told how far the work is, ten times a second or more; may be NULL.
+ * @param user given to `progress`.
+ * @return GIB_DONE; GIB_ERR_ABORTED; GIB_ERR_STATE before `gib_diagnosis_start` or while another thread works;
+ * GIB_ERR_NULL, GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
+ *
+ * [thread: setup] [real-time: no] [state: started]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `progress` is NULL or a function that may be called with `user` from other threads
+ * until this call returns.
+ */
+int32_t gib_diagnosis_step(struct gib_diagnosis *handle,
+                           gib_diagnosis_progress progress,
+                           void *user);
+
+/**
+ * Stops a diagnosis that another thread works at: its `gib_diagnosis_step` returns GIB_ERR_ABORTED soon.
+ *
+ * @param handle the instance.
+ * @return GIB_OK, also when nothing is running; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: any] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance.
+ */
+int32_t gib_diagnosis_abort(struct gib_diagnosis *handle);
+
+/**
+ * What the diagnosis came to, in numbers.
+ *
+ * @param handle the instance.
+ * @param report receives it; zeroed on an error.
+ * @return GIB_OK; GIB_ERR_STATE before a `gib_diagnosis_step` is done, or while another thread works; GIB_ERR_NULL,
+ * GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
+ *
+ * [thread: setup] [real-time: no] [state: done]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `report` is NULL or writable.
+ */
+int32_t gib_diagnosis_result(const struct gib_diagnosis *handle,
+                             struct gib_diagnosis_report *report);
+
+/**
+ * The diagnosis as JSON with schema "gib.diagnosis/1".
+ *
+ * Ask for the size first: `gib_diagnosis_json(handle, NULL, 0, &needed)`.
+ *
+ * @param handle the instance.
+ * @param json receives the text, UTF-8, with its NUL; NULL to ask for the size alone.
+ * @param size bytes at `json`.
+ * @param needed receives the bytes for all of it with its NUL; may be NULL.
+ * @return GIB_OK; GIB_ERR_BUFFER when `size` is too small; GIB_ERR_STATE before a `gib_diagnosis_step` is done, or while
+ * another thread works; GIB_ERR_NULL, GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
+ *
+ * [thread: setup] [real-time: no] [state: done]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `json` is NULL or points to `size` writable bytes; `needed` is NULL or writable.
+ */
+int32_t gib_diagnosis_json(const struct gib_diagnosis *handle,
+                           char *json,
+                           uintptr_t size,
+                           uintptr_t *needed);
+
+/**
+ * Puts the machine with what was found into a machine handle, to be saved, or to be diagnosed again.
+ *
+ * @param handle the instance.
+ * @param machine receives it; may be the one that the diagnosis was started with.
+ * @return GIB_OK; GIB_ERR_STATE before a `gib_diagnosis_step` is done, or while another thread works; GIB_ERR_NULL,
+ * GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
+ *
+ * [thread: setup] [real-time: no] [state: done]
+ *
+ * # Safety
+ * `handle` and `machine` are NULL or instances.
+ */
+int32_t gib_diagnosis_machine(const struct gib_diagnosis *handle,
+                              struct gib_machine *machine);
+
+/**
+ * Why the last call failed, as a sentence that names file, row and column, what was found and what is allowed.
+ *
+ * @param handle the instance.
+ * @param text receives the sentence, UTF-8, with its NUL; empty when nothing went wrong.
+ * @param size bytes at `text`; a longer sentence is cut.
+ * @return GIB_OK; GIB_ERR_BUFFER when the sentence was cut; GIB_ERR_STATE while another thread works; GIB_ERR_NULL,
+ * GIB_ERR_HANDLE.
+ *
+ * [thread: setup] [real-time: no] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `text` is NULL or points to `size` writable bytes.
+ */
+int32_t gib_diagnosis_last_error_text(const struct gib_diagnosis *handle,
+                                      char *text,
+                                      uintptr_t size);
+
+/**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
  *
  * @return the size in bytes, about 66 KiB.
@@ -4491,6 +4827,134 @@ int32_t gib_inertia_result(struct gib_inertia *handle, struct gib_inertia_report
  * `handle` is NULL or an instance; `detail` is NULL or writable.
  */
 int32_t gib_inertia_last_error(const struct gib_inertia *handle, struct gib_error_detail *detail);
+
+/**
+ * Makes an empty instance.
+ *
+ * @return the handle, to be given to `gib_machine_free`; NULL when there is no memory.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ */
+struct gib_machine *gib_machine_new(void);
+
+/**
+ * Frees an instance. NULL is allowed and does nothing.
+ *
+ * @param handle an instance from `gib_machine_new`, in use by no call.
+ *
+ * [thread: setup] [real-time: no] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or came from `gib_machine_new` and was not freed before.
+ */
+void gib_machine_free(struct gib_machine *handle);
+
+/**
+ * Reads a machine from JSON with schema "gib.machine/1", with or without `effects`.
+ *
+ * @param handle the instance; what it held is replaced, or kept when the text cannot be used.
+ * @param json the text, UTF-8; stays yours.
+ * @param length bytes at `json`, without a NUL if there is one.
+ * @return GIB_OK; GIB_ERR_FORMAT, and gib_machine_last_error_text names the path in the JSON, the value found and what
+ * is allowed; GIB_ERR_NULL, GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
+ *
+ * [thread: setup] [real-time: no] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `json` is NULL or points to `length` readable bytes.
+ */
+int32_t gib_machine_read(struct gib_machine *handle,
+                         const char *json,
+                         uintptr_t length);
+
+/**
+ * Reads a machine file.
+ *
+ * @param handle the instance; what it held is replaced, or kept when the file cannot be used.
+ * @param path NUL-terminated; stays yours.
+ * @return GIB_OK; GIB_ERR_IO, GIB_ERR_FORMAT (gib_machine_last_error_text says where and why), GIB_ERR_NULL,
+ * GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
+ *
+ * [thread: setup] [real-time: no] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `path` is NULL or NUL-terminated.
+ */
+int32_t gib_machine_load(struct gib_machine *handle, const char *path);
+
+/**
+ * Writes the machine file.
+ *
+ * @param handle the instance.
+ * @param path NUL-terminated; stays yours. A file of that name is replaced.
+ * @return GIB_OK; GIB_ERR_IO; GIB_ERR_STATE when no machine was read; GIB_ERR_NULL, GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
+ *
+ * [thread: setup] [real-time: no] [state: a machine was read]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `path` is NULL or NUL-terminated.
+ */
+int32_t gib_machine_save(struct gib_machine *handle,
+                         const char *path);
+
+/**
+ * The machine as JSON with schema "gib.machine/1".
+ *
+ * Ask for the size first: `gib_machine_result(handle, NULL, 0, &needed)`.
+ *
+ * @param handle the instance.
+ * @param json receives the text, UTF-8, with its NUL; NULL to ask for the size alone.
+ * @param size bytes at `json`.
+ * @param needed receives the bytes for all of it with its NUL; may be NULL.
+ * @return GIB_OK; GIB_ERR_BUFFER when `size` is too small; GIB_ERR_STATE when no machine was read; GIB_ERR_NULL,
+ * GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
+ *
+ * [thread: setup] [real-time: no] [state: a machine was read]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `json` is NULL or points to `size` writable bytes; `needed` is NULL or writable.
+ */
+int32_t gib_machine_result(const struct gib_machine *handle,
+                           char *json,
+                           uintptr_t size,
+                           uintptr_t *needed);
+
+/**
+ * Keys of the file that have no meaning here, a line each, as paths in the JSON: ignored, but one may be a slip.
+ *
+ * @param handle the instance.
+ * @param text receives the lines with a NUL; empty when every key has a meaning. NULL to ask for the size alone.
+ * @param size bytes at `text`.
+ * @param needed receives the bytes for all of it with its NUL; may be NULL.
+ * @return as gib_machine_result.
+ *
+ * [thread: setup] [real-time: no] [state: a machine was read]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `text` is NULL or points to `size` writable bytes; `needed` is NULL or writable.
+ */
+int32_t gib_machine_ignored_keys(const struct gib_machine *handle,
+                                 char *text,
+                                 uintptr_t size,
+                                 uintptr_t *needed);
+
+/**
+ * Why the last call failed, as a sentence that names the file or the path in the JSON, what was found and what is
+ * allowed.
+ *
+ * @param handle the instance.
+ * @param text receives the sentence, UTF-8, with its NUL; empty when the last call did its work.
+ * @param size bytes at `text`; a longer sentence is cut.
+ * @return GIB_OK; GIB_ERR_BUFFER when the sentence was cut; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup] [real-time: no] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `text` is NULL or points to `size` writable bytes.
+ */
+int32_t gib_machine_last_error_text(const struct gib_machine *handle,
+                                    char *text,
+                                    uintptr_t size);
 
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.

@@ -177,6 +177,11 @@ pub const GIB_ERR_TILT_SHAPE: i32 = -505;
 /// The samples of the current fall on too few of its phases for a true RMS.
 pub const GIB_ERR_TILT_ALIAS: i32 = -506;
 
+/// The machine has no axis of that name, or shares none with the recording.
+pub const GIB_ERR_DIAGNOSIS_AXIS: i32 = -1200;
+/// The second recording cannot serve to measure the gain.
+pub const GIB_ERR_DIAGNOSIS_HOLDOUT: i32 = -1201;
+
 /// Every status and the sentence that explains it.
 const TEXTS: &[(i32, &str)] = &[
     (GIB_OK, "ok\0"),
@@ -262,6 +267,8 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_TILT_SIZE, "the offsets that undo the tilt are larger than allowed\0"),
     (GIB_ERR_TILT_SHAPE, "the depth along the path is no line or plane\0"),
     (GIB_ERR_TILT_ALIAS, "the samples of the current fall on too few of its phases\0"),
+    (GIB_ERR_DIAGNOSIS_AXIS, "the machine has no such axis, or shares none with the recording\0"),
+    (GIB_ERR_DIAGNOSIS_HOLDOUT, "the second recording cannot serve to measure the gain\0"),
 ];
 
 /// The text of a status, NUL-terminated and static; for an unknown number a text that says so.

@@ -6,8 +6,10 @@
 
 use super::backlash::*;
 use super::calibration::*;
+use super::diagnosis::*;
 use super::homing::*;
 use super::inertia::*;
+use super::machine::*;
 use super::program::*;
 use super::recorder::*;
 use super::speed_variation::*;
@@ -307,6 +309,47 @@ pub struct GibApiTable {
         result: *mut TiltTwoPointResult,
         detail: *mut GibErrorDetail,
     ) -> i32,
+
+    /// See gib_machine_new.
+    pub machine_new: extern "C" fn() -> *mut GibMachine,
+    /// See gib_machine_free.
+    pub machine_free: unsafe extern "C" fn(handle: *mut GibMachine),
+    /// See gib_machine_read.
+    pub machine_read: unsafe extern "C" fn(handle: *mut GibMachine, json: *const c_char, length: usize) -> i32,
+    /// See gib_machine_load.
+    pub machine_load: unsafe extern "C" fn(handle: *mut GibMachine, path: *const c_char) -> i32,
+    /// See gib_machine_save.
+    pub machine_save: unsafe extern "C" fn(handle: *mut GibMachine, path: *const c_char) -> i32,
+    /// See gib_machine_result.
+    pub machine_result:
+        unsafe extern "C" fn(handle: *const GibMachine, json: *mut c_char, size: usize, needed: *mut usize) -> i32,
+    /// See gib_machine_ignored_keys.
+    pub machine_ignored_keys:
+        unsafe extern "C" fn(handle: *const GibMachine, text: *mut c_char, size: usize, needed: *mut usize) -> i32,
+    /// See gib_machine_last_error_text.
+    pub machine_last_error_text: unsafe extern "C" fn(handle: *const GibMachine, text: *mut c_char, size: usize) -> i32,
+
+    /// See gib_diagnosis_new.
+    pub diagnosis_new: extern "C" fn() -> *mut GibDiagnosis,
+    /// See gib_diagnosis_free.
+    pub diagnosis_free: unsafe extern "C" fn(handle: *mut GibDiagnosis),
+    /// See gib_diagnosis_start.
+    pub diagnosis_start: unsafe extern "C" fn(handle: *mut GibDiagnosis, config: *const GibDiagnosisConfig) -> i32,
+    /// See gib_diagnosis_step.
+    pub diagnosis_step:
+        unsafe extern "C" fn(handle: *mut GibDiagnosis, progress: GibDiagnosisProgress, user: *mut c_void) -> i32,
+    /// See gib_diagnosis_abort.
+    pub diagnosis_abort: unsafe extern "C" fn(handle: *mut GibDiagnosis) -> i32,
+    /// See gib_diagnosis_result.
+    pub diagnosis_result: unsafe extern "C" fn(handle: *const GibDiagnosis, report: *mut GibDiagnosisReport) -> i32,
+    /// See gib_diagnosis_json.
+    pub diagnosis_json:
+        unsafe extern "C" fn(handle: *const GibDiagnosis, json: *mut c_char, size: usize, needed: *mut usize) -> i32,
+    /// See gib_diagnosis_machine.
+    pub diagnosis_machine: unsafe extern "C" fn(handle: *const GibDiagnosis, machine: *mut GibMachine) -> i32,
+    /// See gib_diagnosis_last_error_text.
+    pub diagnosis_last_error_text:
+        unsafe extern "C" fn(handle: *const GibDiagnosis, text: *mut c_char, size: usize) -> i32,
 }
 
 static API: GibApiTable = GibApiTable {
@@ -417,6 +460,23 @@ static API: GibApiTable = GibApiTable {
     tilt_table_save: gib_tilt_table_save,
     tilt_table_load: gib_tilt_table_load,
     tilt_two_point: gib_tilt_two_point,
+    machine_new: gib_machine_new,
+    machine_free: gib_machine_free,
+    machine_read: gib_machine_read,
+    machine_load: gib_machine_load,
+    machine_save: gib_machine_save,
+    machine_result: gib_machine_result,
+    machine_ignored_keys: gib_machine_ignored_keys,
+    machine_last_error_text: gib_machine_last_error_text,
+    diagnosis_new: gib_diagnosis_new,
+    diagnosis_free: gib_diagnosis_free,
+    diagnosis_start: gib_diagnosis_start,
+    diagnosis_step: gib_diagnosis_step,
+    diagnosis_abort: gib_diagnosis_abort,
+    diagnosis_result: gib_diagnosis_result,
+    diagnosis_json: gib_diagnosis_json,
+    diagnosis_machine: gib_diagnosis_machine,
+    diagnosis_last_error_text: gib_diagnosis_last_error_text,
 };
 
 /// The table of all functions, so that `dlsym` needs one name: "gib_api".

@@ -1,6 +1,7 @@
 //! Family `calibration`: accelerometers against a ball bar, as seen from C.
 
 use super::guard::{guarded, instance, instance_mut, placed, versioned};
+use super::text::path_of;
 use super::types::GibErrorDetail;
 use crate::cycle::calibration::config::CalibrationConfig;
 use crate::cycle::calibration::io::{CalibrationInput, CalibrationOutput, GIB_CALIBRATION_FAILED};
@@ -9,10 +10,7 @@ use crate::cycle::calibration::plan::Plan;
 use crate::cycle::calibration::table::CalibrationTable;
 use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_ERR_STATE, GIB_ERR_STRUCT_SIZE, GIB_OK};
 use crate::machine::calibration;
-use core::ffi::{CStr, c_char, c_void};
-use std::ffi::OsStr;
-use std::os::unix::ffi::OsStrExt;
-use std::path::Path;
+use core::ffi::{c_char, c_void};
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
 const ALIVE: u64 = 0x6769_625f_6361_0001;
@@ -244,7 +242,7 @@ pub unsafe extern "C" fn gib_calibration_result(handle: *const GibCalibration, t
 pub unsafe extern "C" fn gib_calibration_save(handle: *mut GibCalibration, path: *const c_char) -> i32 {
     guarded(|| {
         // SAFETY: the caller's promise.
-        let (handle, path) = unsafe { (instance_mut(handle)?, named(path)?) };
+        let (handle, path) = unsafe { (instance_mut(handle)?, path_of(path)?) };
         let known = handle.machine.table().ok_or(Fault::of(GIB_ERR_STATE));
         let refused = known.and_then(|table| calibration::save(table, path)).err();
         Ok(handle.keep(refused))
@@ -266,23 +264,11 @@ pub unsafe extern "C" fn gib_calibration_save(handle: *mut GibCalibration, path:
 pub unsafe extern "C" fn gib_calibration_load(handle: *mut GibCalibration, path: *const c_char) -> i32 {
     guarded(|| {
         // SAFETY: the caller's promise.
-        let (handle, path) = unsafe { (instance_mut(handle)?, named(path)?) };
+        let (handle, path) = unsafe { (instance_mut(handle)?, path_of(path)?) };
         let read = if handle.machine.busy() { Err(Fault::of(GIB_ERR_STATE)) } else { calibration::load(path) };
         let refused = read.map(|table| handle.machine.install(table)).err();
         Ok(handle.keep(refused))
     })
-}
-
-/// The path that a caller names.
-///
-/// # Safety
-/// `path` is NULL or NUL-terminated.
-unsafe fn named<'a>(path: *const c_char) -> Result<&'a Path, i32> {
-    if path.is_null() {
-        return Err(GIB_ERR_NULL);
-    }
-    // SAFETY: not NULL, NUL-terminated by the caller's promise.
-    Ok(Path::new(OsStr::from_bytes(unsafe { CStr::from_ptr(path) }.to_bytes())))
 }
 
 /// The first error of the present run, or why the last call was refused: code, field, value and bounds.

@@ -135,7 +135,10 @@ pub unsafe fn release<T: Instance>(handle: *mut T) {
     // SAFETY: the caller's promise.
     if let Ok(instance) = unsafe { instance_mut(handle) } {
         instance.bury();
-        // SAFETY: `allocated` used this layout; instances are plain data with nothing to drop.
-        unsafe { std::alloc::dealloc(handle.cast(), std::alloc::Layout::new::<T>()) };
+        // SAFETY: a live instance, dropped once; `allocated` used this layout.
+        unsafe {
+            core::ptr::drop_in_place(handle);
+            std::alloc::dealloc(handle.cast(), std::alloc::Layout::new::<T>());
+        }
     }
 }

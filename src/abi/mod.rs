@@ -8,13 +8,16 @@
 pub mod api;
 pub mod backlash;
 pub mod calibration;
+pub mod diagnosis;
 pub mod guard;
 pub mod homing;
 pub mod inertia;
+pub mod machine;
 pub mod program;
 pub mod recorder;
 pub mod shared_memory;
 pub mod speed_variation;
+pub mod text;
 pub mod tilt;
 pub mod types;
 pub mod vibration;

@@ -1,12 +1,11 @@
 //! Family `program`: INA, the load inertia in kg·m², in the head of a part program, as seen from C.
 
 use super::guard::{guarded, instance, instance_mut, placed};
+use super::text::{copy_out, path_of};
 use super::types::GibErrorDetail;
-use crate::error::{Fault, GIB_ERR_BUFFER, GIB_ERR_CONFIG, GIB_ERR_NULL, GIB_ERR_PROGRAM_ABSENT, GIB_OK};
+use crate::error::{Fault, GIB_ERR_CONFIG, GIB_ERR_NULL, GIB_ERR_PROGRAM_ABSENT, GIB_OK};
 use crate::program::{self, Dialect, Error, Scope};
-use core::ffi::{CStr, c_char, c_void};
-use std::ffi::OsStr;
-use std::os::unix::ffi::OsStrExt;
+use core::ffi::{c_char, c_void};
 use std::path::Path;
 
 /// Spell a new value as the program's own dialect is recognised.
@@ -84,11 +83,8 @@ impl GibProgram {
 /// # Safety
 /// `path` is NULL or NUL-terminated.
 unsafe fn named<'a>(path: *const c_char, step: u32) -> Result<(&'a Path, Scope), Refusal> {
-    if path.is_null() {
-        return Err(Fault::of(GIB_ERR_NULL).into());
-    }
-    // SAFETY: not NULL, NUL-terminated by the caller's promise.
-    let path = Path::new(OsStr::from_bytes(unsafe { CStr::from_ptr(path) }.to_bytes()));
+    // SAFETY: the caller's promise.
+    let path = unsafe { path_of(path) }.map_err(Fault::of)?;
     let (value, high) = (f64::from(step), f64::from(Scope::LAST_STEP));
     let refused = Fault { code: GIB_ERR_CONFIG, field: "step\0", value, low: 0.0, high };
     Ok((path, Scope::from_number(step).ok_or(refused)?))
@@ -304,17 +300,9 @@ pub unsafe extern "C" fn gib_program_last_error_text(handle: *const GibProgram, 
     guarded(|| {
         // SAFETY: the caller's promise.
         let handle = unsafe { instance(handle) }?;
-        if text.is_null() {
-            return Err(GIB_ERR_NULL);
-        }
         let length = handle.text.iter().position(|byte| *byte == 0).unwrap_or(0);
-        let Some(room) = size.checked_sub(1) else { return Err(GIB_ERR_BUFFER) };
-        let fits = length.min(room);
-        // SAFETY: fits < size, so the text and its NUL stay within the caller's buffer; fits ≤ length.
-        unsafe {
-            core::ptr::copy_nonoverlapping(handle.text.as_ptr(), text.cast(), fits);
-            text.add(fits).write(0);
-        }
-        if fits == length { Ok(GIB_OK) } else { Err(GIB_ERR_BUFFER) }
+        let sentence = core::str::from_utf8(&handle.text[..length]).unwrap_or_default();
+        // SAFETY: the caller's promise.
+        unsafe { copy_out(sentence, text, size, core::ptr::null_mut()) }
     })
 }

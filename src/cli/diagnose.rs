@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use gib::diagnosis::{Diagnosis, Verdict, diagnose};
+use gib::diagnosis::{Diagnosis, Verdict, axis_of, diagnose};
 use gib::machine::Drive;
 use gib::recording::Recording;
 
@@ -54,16 +54,8 @@ impl Diagnose {
         let mut machine = machine_file::load(&self.machine)?;
         let recording = Recording::open(&self.recording)?;
         let holdout = self.holdout.as_deref().map(Recording::open).transpose()?;
-        let channels = recording.channels();
-        let wanted = |name: &str| self.axis.as_deref().map_or_else(|| channels.contains(&name), |w| w == name);
-        let Some(axis) = machine.axes.iter_mut().find(|axis| wanted(&axis.name)) else {
-            return Err(format!(
-                "no axis to diagnose: the machine file and the recording (channels {}) share no axis{}",
-                channels.join(", "),
-                self.axis.as_ref().map_or(String::new(), |a| format!(" {a}"))
-            )
-            .into());
-        };
+        let chosen = axis_of(&machine, &recording, self.axis.as_deref())?;
+        let axis = &mut machine.axes[chosen];
         if let Some(holdout) = &holdout {
             gib::diagnosis::usable(holdout, axis)?;
         }

@@ -9,6 +9,7 @@
 
 mod belief;
 pub mod causes;
+mod choice;
 mod columns;
 pub mod experiment;
 pub mod filter;
@@ -22,6 +23,7 @@ pub mod show;
 pub mod uncertainty;
 pub mod verdict;
 
+pub use choice::axis_of;
 pub use progress::{Progress, Stopped};
 pub use show::{Coordinate, View};
 pub use verdict::{Diagnosis, Finding, Unexplained, Verdict, diagnose, usable};

@@ -68,14 +68,12 @@ pub fn read(text: &str) -> Result<CalibrationTable, Fault> {
     Ok(table)
 }
 
-/// Writes a table to a file: beside it first, then in its place.
+/// Writes a table to a file, whole or not at all.
 ///
 /// # Errors
 /// `GIB_ERR_IO`.
 pub fn save(table: &CalibrationTable, path: &Path) -> Result<(), Fault> {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".new");
-    let written = std::fs::write(&name, write(table)).and_then(|()| std::fs::rename(&name, path));
+    let written = super::whole::replace(path, &write(table));
     written.map_err(|_| Fault { code: GIB_ERR_IO, field: "path\0", ..Fault::NONE })
 }
 

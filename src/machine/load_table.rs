@@ -55,14 +55,8 @@ pub fn save(table: &TiltTable, file: &Path) -> Result<(), Error> {
         error(fault, format!("{}: not written: {field} is {}, allowed from {}", file.display(), fault.value, fault.low))
     })?;
     let text = format!("{:#}\n", to_json(table));
-    let mut name = file.file_name().unwrap_or_default().to_owned();
-    name.push(".new");
-    let beside = file.with_file_name(name);
-    std::fs::write(&beside, text).and_then(|()| std::fs::rename(&beside, file)).map_err(|e| {
-        // What could not be put in place is not left lying about.
-        let _ = std::fs::remove_file(&beside);
-        error(Fault::of(GIB_ERR_IO), format!("{}: cannot write the load table: {e}", file.display()))
-    })
+    super::whole::replace(file, &text)
+        .map_err(|e| error(Fault::of(GIB_ERR_IO), format!("{}: cannot write the load table: {e}", file.display())))
 }
 
 /// The table as JSON.

@@ -12,6 +12,7 @@ mod cause;
 pub mod load_table;
 mod read;
 mod two_masses;
+mod whole;
 mod write;
 
 pub use cause::{CAUSES, Cause, CauseRow, Effect, Parameter};

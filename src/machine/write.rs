@@ -12,13 +12,14 @@ impl Machine {
         json!({ "schema": "gib.machine/1", "name": self.name, "axes": axes })
     }
 
-    /// Writes the machine file.
+    /// Writes the machine file, whole or not at all.
     ///
     /// # Errors
     /// The system's, with the file's name.
     pub fn save(&self, file: &Path) -> std::io::Result<()> {
         let text = format!("{:#}\n", self.to_json());
-        std::fs::write(file, text).map_err(|e| std::io::Error::new(e.kind(), format!("{}: {e}", file.display())))
+        super::whole::replace(file, &text)
+            .map_err(|e| std::io::Error::new(e.kind(), format!("{}: {e}", file.display())))
     }
 }
 
