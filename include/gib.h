@@ -2574,85 +2574,6 @@ typedef struct gib_inertia_report {
 } gib_inertia_report;
 
 /**
- * What to record, under which name. Zero in a field means its default; fields marked "required" have none.
- */
-typedef struct gib_recorder_config {
-    /**
-     * Size of this struct as the caller knows it: `sizeof(gib_recorder_config)`. Required.
-     */
-    uint32_t struct_size;
-    /**
-     * Values in every row, 1 to 64. Required.
-     */
-    uint32_t channels;
-    /**
-     * Rows in the ring, 16 to what makes 1 GiB (default: four seconds of rows). A reader that is away longer loses rows.
-     */
-    uint32_t capacity_rows;
-    /**
-     * Servo cycles from row to row, 1 to 1000000 (default 1).
-     */
-    uint32_t every_cycles;
-    /**
-     * Permissions of the shared memory, from 0600 (default: who records may read) to 0666.
-     */
-    uint32_t mode;
-    /**
-     * Zero.
-     */
-    uint32_t reserved;
-    /**
-     * Servo period, 0.000001 to 1 s. Required.
-     */
-    double cycle_s;
-    /**
-     * Name under which `gib record` finds it: 1 to 40 letters, digits, `-`, `_`, `.`. Copied. Required.
-     */
-    const char *name;
-    /**
-     * Name of the machine, which every recording carries: 1 to 40 letters, digits, `-`, `_`. Copied. Required.
-     */
-    const char *machine;
-    /**
-     * Names of the columns, one a channel, separated by commas: "x.position_mm,x.torque_nm". At most 3775 bytes. A
-     * signal of the recording format must have a unit that it can have; other names are recorded as they are.
-     * Copied. Required.
-     */
-    const char *columns;
-} gib_recorder_config;
-
-/**
- * What a recorder has done.
- */
-typedef struct gib_recorder_report {
-    /**
-     * Rows written since the start.
-     */
-    uint64_t rows;
-    /**
-     * Bytes of shared memory.
-     */
-    uint64_t bytes;
-    /**
-     * Rows in the ring.
-     */
-    uint32_t capacity_rows;
-    /**
-     * Values in a row.
-     */
-    uint32_t channels;
-    /**
-     * 1: the memory is locked and never paged out. 0: the system refused the lock (RLIMIT_MEMLOCK); the pages are there
-     * all the same, and only a machine short of memory can take them away.
-     */
-    int32_t locked;
-    /**
-     * What the last step returned.
-     */
-    int32_t status;
-} gib_recorder_report;
-
-/**
  * What to vary, by which motor. Zero in a field means its default; fields marked "required" have none.
  */
 typedef struct gib_speed_variation_config {
@@ -2860,6 +2781,286 @@ typedef struct gib_speed_variation_limits {
      */
     int32_t reserved;
 } gib_speed_variation_limits;
+
+/**
+ * What to record, under which name. Zero in a field means its default; fields marked "required" have none.
+ */
+typedef struct gib_recorder_config {
+    /**
+     * Size of this struct as the caller knows it: `sizeof(gib_recorder_config)`. Required.
+     */
+    uint32_t struct_size;
+    /**
+     * Values in every row, 1 to 64. Required.
+     */
+    uint32_t channels;
+    /**
+     * Rows in the ring, 16 to what makes 1 GiB (default: four seconds of rows). A reader that is away longer loses rows.
+     */
+    uint32_t capacity_rows;
+    /**
+     * Servo cycles from row to row, 1 to 1000000 (default 1).
+     */
+    uint32_t every_cycles;
+    /**
+     * Permissions of the shared memory, from 0600 (default: who records may read) to 0666.
+     */
+    uint32_t mode;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+    /**
+     * Servo period, 0.000001 to 1 s. Required.
+     */
+    double cycle_s;
+    /**
+     * Name under which `gib record` finds it: 1 to 40 letters, digits, `-`, `_`, `.`. Copied. Required.
+     */
+    const char *name;
+    /**
+     * Name of the machine, which every recording carries: 1 to 40 letters, digits, `-`, `_`. Copied. Required.
+     */
+    const char *machine;
+    /**
+     * Names of the columns, one a channel, separated by commas: "x.position_mm,x.torque_nm". At most 3775 bytes. A
+     * signal of the recording format must have a unit that it can have; other names are recorded as they are.
+     * Copied. Required.
+     */
+    const char *columns;
+} gib_recorder_config;
+
+/**
+ * What a recorder has done.
+ */
+typedef struct gib_recorder_report {
+    /**
+     * Rows written since the start.
+     */
+    uint64_t rows;
+    /**
+     * Bytes of shared memory.
+     */
+    uint64_t bytes;
+    /**
+     * Rows in the ring.
+     */
+    uint32_t capacity_rows;
+    /**
+     * Values in a row.
+     */
+    uint32_t channels;
+    /**
+     * 1: the memory is locked and never paged out. 0: the system refused the lock (RLIMIT_MEMLOCK); the pages are there
+     * all the same, and only a machine short of memory can take them away.
+     */
+    int32_t locked;
+    /**
+     * What the last step returned.
+     */
+    int32_t status;
+} gib_recorder_report;
+
+/**
+ * How the position is to be corrected. Zero in a field means its default; fields marked "required" have none.
+ */
+typedef struct gib_vibration_config {
+    /**
+     * Size of this struct as the caller knows it: `sizeof(gib_vibration_config)`. Required.
+     */
+    uint32_t struct_size;
+    /**
+     * `GIB_VIBRATION_HARMONIC` (default) or `GIB_VIBRATION_INTEGRATE`.
+     */
+    int32_t method;
+    /**
+     * Harmonics of a revolution that are tracked, 1 to 16 (default 8). The workpiece's form and twice its corners should
+     * be among them. Those above 0.4 of the sampling frequency are left out while the spindle is that fast.
+     */
+    int32_t harmonics;
+    /**
+     * 1: a second slide (XM) carries the slide; its encoder is in the input. 0 (default): none.
+     */
+    int32_t second_slide;
+    /**
+     * Harmonic at which `GIB_VIBRATION_INTEGRATE` takes gain and phase of the calibration, 1 to 16 (default 1).
+     */
+    int32_t main_harmonic;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
+    /**
+     * Servo period, 0.00005 to 0.02 s. Required.
+     */
+    double cycle_s;
+    /**
+     * Full scale of the accelerometers, 0.1 to 10000 m/s²: a reading there is saturated. Required.
+     */
+    double acceleration_range_m_s2;
+    /**
+     * Largest plausible acceleration, up to the range (default).
+     */
+    double acceleration_max_m_s2;
+    /**
+     * Largest plausible displacement of seat or bearing, 0.1 to 10000 µm (default 100): more is a bad sensor.
+     */
+    double displacement_max_um;
+    /**
+     * Slowest speed at which the spindle counts as turning, 1 to 10000 rpm (default 30).
+     */
+    double speed_min_rpm;
+    /**
+     * Fastest speed that the spindle's encoder can show, up to a quarter turn a cycle (default 10000, or that).
+     */
+    double speed_max_rpm;
+    /**
+     * Lowest frequency at which an acceleration is worth a displacement, 0.1 to 1000 Hz (default 1).
+     */
+    double frequency_min_hz;
+    /**
+     * Revolutions over which the harmonics are averaged, 1 to 1000 (default 8).
+     */
+    double averaging_revolutions;
+    /**
+     * Time over which the correction comes and goes, 0.001 to 10 s (default 0.1).
+     */
+    double fade_s;
+    /**
+     * Time constant of the measured speed, one cycle to 1 s (default 0.02).
+     */
+    double speed_filter_s;
+} gib_vibration_config;
+/**
+ * Size of the struct in the first published ABI.
+ */
+#define gib_vibration_config_FIRST_SIZE 104
+
+/**
+ * What the kernel tells gib in a cycle, all of the same instant.
+ */
+typedef struct gib_vibration_input {
+    /**
+     * X linear scale: tool slide against its seat, mm.
+     */
+    double scale_mm;
+    /**
+     * Encoder of the second slide (XM), mm; only looked at with `second_slide`.
+     */
+    double second_slide_mm;
+    /**
+     * Spindle angle, degrees; wrapped anywhere or not at all.
+     */
+    double angle_deg;
+    /**
+     * Acceleration of seat and bearing, m/s², positive as the scale is.
+     */
+    double acceleration_m_s2[2];
+    /**
+     * `GIB_INPUT_ABORT`, `GIB_INPUT_FAULT`; other bits must be 0. Both fade the correction out.
+     */
+    uint32_t flags;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+} gib_vibration_input;
+
+/**
+ * What gib gives back in a cycle. Always written, and finite, also when the call returns an error.
+ */
+typedef struct gib_vibration_output {
+    /**
+     * Where the tool is against the workpiece: scale, second slide, and correction, mm.
+     */
+    double position_mm;
+    /**
+     * The correction that is in `position_mm`, µm.
+     */
+    double correction_um;
+    /**
+     * Displacement of seat and bearing, µm; the second slide's own motion is not in it.
+     */
+    double displacement_um[2];
+    /**
+     * Their difference, seat minus bearing, µm.
+     */
+    double relative_um;
+    /**
+     * Measured spindle speed, signed, rpm.
+     */
+    double speed_rpm;
+    /**
+     * How much of the relative displacement is in the position: 0, plain scale, to 1.
+     */
+    double blend_ratio;
+    /**
+     * What the step returned: `GIB_OK` idle, `GIB_BUSY`, or the first error.
+     */
+    int32_t status;
+    /**
+     * One of the `GIB_VIBRATION_…` phases.
+     */
+    int32_t phase;
+    /**
+     * 0, or the status to tell the operator about; its text is `gib_status_text`.
+     */
+    int32_t message;
+    /**
+     * Why the plain scale is in force, or on its way: a sum of `GIB_VIBRATION_…` reasons, 0 when the correction is.
+     */
+    uint32_t reasons;
+} gib_vibration_output;
+
+/**
+ * What is known of the vibration. Amplitudes are those of `A·cos(kθ − phase)`.
+ */
+typedef struct gib_vibration_report {
+    /**
+     * Amplitude of the relative displacement at each harmonic from 1 on, µm; method harmonic only.
+     */
+    double amplitude_um[GIB_VIBRATION_HARMONICS];
+    /**
+     * Its phase at spindle angle 0, degrees.
+     */
+    double phase_deg[GIB_VIBRATION_HARMONICS];
+    /**
+     * Offset of each accelerometer, m/s².
+     */
+    double offset_m_s2[2];
+    /**
+     * What the harmonics leave of each acceleration, standard deviation, m/s²; method harmonic only.
+     */
+    double noise_m_s2[2];
+    /**
+     * Measured spindle speed, signed, rpm.
+     */
+    double speed_rpm;
+    /**
+     * Revolutions since the last time that the correction had to begin anew.
+     */
+    double revolutions;
+    /**
+     * Cycles since the start that the spindle turned and a bad sensor kept the correction out.
+     */
+    uint64_t degraded_cycles;
+    /**
+     * Every reason since the start.
+     */
+    uint32_t reasons_seen;
+    /**
+     * `GIB_BUSY`, `GIB_OK` before a start, or the first error.
+     */
+    int32_t status;
+    /**
+     * `GIB_VIBRATION_HARMONIC` or `GIB_VIBRATION_INTEGRATE`.
+     */
+    int32_t method;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
+} gib_vibration_report;
 
 /**
  * A machining condition. A table holds for one only.
@@ -3294,207 +3495,6 @@ typedef struct gib_tilt_two_point_result {
      */
     double slope;
 } gib_tilt_two_point_result;
-
-/**
- * How the position is to be corrected. Zero in a field means its default; fields marked "required" have none.
- */
-typedef struct gib_vibration_config {
-    /**
-     * Size of this struct as the caller knows it: `sizeof(gib_vibration_config)`. Required.
-     */
-    uint32_t struct_size;
-    /**
-     * `GIB_VIBRATION_HARMONIC` (default) or `GIB_VIBRATION_INTEGRATE`.
-     */
-    int32_t method;
-    /**
-     * Harmonics of a revolution that are tracked, 1 to 16 (default 8). The workpiece's form and twice its corners should
-     * be among them. Those above 0.4 of the sampling frequency are left out while the spindle is that fast.
-     */
-    int32_t harmonics;
-    /**
-     * 1: a second slide (XM) carries the slide; its encoder is in the input. 0 (default): none.
-     */
-    int32_t second_slide;
-    /**
-     * Harmonic at which `GIB_VIBRATION_INTEGRATE` takes gain and phase of the calibration, 1 to 16 (default 1).
-     */
-    int32_t main_harmonic;
-    /**
-     * Zero.
-     */
-    int32_t reserved;
-    /**
-     * Servo period, 0.00005 to 0.02 s. Required.
-     */
-    double cycle_s;
-    /**
-     * Full scale of the accelerometers, 0.1 to 10000 m/s²: a reading there is saturated. Required.
-     */
-    double acceleration_range_m_s2;
-    /**
-     * Largest plausible acceleration, up to the range (default).
-     */
-    double acceleration_max_m_s2;
-    /**
-     * Largest plausible displacement of seat or bearing, 0.1 to 10000 µm (default 100): more is a bad sensor.
-     */
-    double displacement_max_um;
-    /**
-     * Slowest speed at which the spindle counts as turning, 1 to 10000 rpm (default 30).
-     */
-    double speed_min_rpm;
-    /**
-     * Fastest speed that the spindle's encoder can show, up to a quarter turn a cycle (default 10000, or that).
-     */
-    double speed_max_rpm;
-    /**
-     * Lowest frequency at which an acceleration is worth a displacement, 0.1 to 1000 Hz (default 1).
-     */
-    double frequency_min_hz;
-    /**
-     * Revolutions over which the harmonics are averaged, 1 to 1000 (default 8).
-     */
-    double averaging_revolutions;
-    /**
-     * Time over which the correction comes and goes, 0.001 to 10 s (default 0.1).
-     */
-    double fade_s;
-    /**
-     * Time constant of the measured speed, one cycle to 1 s (default 0.02).
-     */
-    double speed_filter_s;
-} gib_vibration_config;
-/**
- * Size of the struct in the first published ABI.
- */
-#define gib_vibration_config_FIRST_SIZE 104
-
-/**
- * What the kernel tells gib in a cycle, all of the same instant.
- */
-typedef struct gib_vibration_input {
-    /**
-     * X linear scale: tool slide against its seat, mm.
-     */
-    double scale_mm;
-    /**
-     * Encoder of the second slide (XM), mm; only looked at with `second_slide`.
-     */
-    double second_slide_mm;
-    /**
-     * Spindle angle, degrees; wrapped anywhere or not at all.
-     */
-    double angle_deg;
-    /**
-     * Acceleration of seat and bearing, m/s², positive as the scale is.
-     */
-    double acceleration_m_s2[2];
-    /**
-     * `GIB_INPUT_ABORT`, `GIB_INPUT_FAULT`; other bits must be 0. Both fade the correction out.
-     */
-    uint32_t flags;
-    /**
-     * Zero.
-     */
-    uint32_t reserved;
-} gib_vibration_input;
-
-/**
- * What gib gives back in a cycle. Always written, and finite, also when the call returns an error.
- */
-typedef struct gib_vibration_output {
-    /**
-     * Where the tool is against the workpiece: scale, second slide, and correction, mm.
-     */
-    double position_mm;
-    /**
-     * The correction that is in `position_mm`, µm.
-     */
-    double correction_um;
-    /**
-     * Displacement of seat and bearing, µm; the second slide's own motion is not in it.
-     */
-    double displacement_um[2];
-    /**
-     * Their difference, seat minus bearing, µm.
-     */
-    double relative_um;
-    /**
-     * Measured spindle speed, signed, rpm.
-     */
-    double speed_rpm;
-    /**
-     * How much of the relative displacement is in the position: 0, plain scale, to 1.
-     */
-    double blend_ratio;
-    /**
-     * What the step returned: `GIB_OK` idle, `GIB_BUSY`, or the first error.
-     */
-    int32_t status;
-    /**
-     * One of the `GIB_VIBRATION_…` phases.
-     */
-    int32_t phase;
-    /**
-     * 0, or the status to tell the operator about; its text is `gib_status_text`.
-     */
-    int32_t message;
-    /**
-     * Why the plain scale is in force, or on its way: a sum of `GIB_VIBRATION_…` reasons, 0 when the correction is.
-     */
-    uint32_t reasons;
-} gib_vibration_output;
-
-/**
- * What is known of the vibration. Amplitudes are those of `A·cos(kθ − phase)`.
- */
-typedef struct gib_vibration_report {
-    /**
-     * Amplitude of the relative displacement at each harmonic from 1 on, µm; method harmonic only.
-     */
-    double amplitude_um[GIB_VIBRATION_HARMONICS];
-    /**
-     * Its phase at spindle angle 0, degrees.
-     */
-    double phase_deg[GIB_VIBRATION_HARMONICS];
-    /**
-     * Offset of each accelerometer, m/s².
-     */
-    double offset_m_s2[2];
-    /**
-     * What the harmonics leave of each acceleration, standard deviation, m/s²; method harmonic only.
-     */
-    double noise_m_s2[2];
-    /**
-     * Measured spindle speed, signed, rpm.
-     */
-    double speed_rpm;
-    /**
-     * Revolutions since the last time that the correction had to begin anew.
-     */
-    double revolutions;
-    /**
-     * Cycles since the start that the spindle turned and a bad sensor kept the correction out.
-     */
-    uint64_t degraded_cycles;
-    /**
-     * Every reason since the start.
-     */
-    uint32_t reasons_seen;
-    /**
-     * `GIB_BUSY`, `GIB_OK` before a start, or the first error.
-     */
-    int32_t status;
-    /**
-     * `GIB_VIBRATION_HARMONIC` or `GIB_VIBRATION_INTEGRATE`.
-     */
-    int32_t method;
-    /**
-     * Zero.
-     */
-    int32_t reserved;
-} gib_vibration_report;
 
 /**
  * All functions of the library, each named as in this header without its `gib_`.
@@ -4566,6 +4566,17 @@ int32_t gib_diagnosis_machine(const struct gib_diagnosis *handle,
 int32_t gib_diagnosis_last_error_text(const struct gib_diagnosis *handle,
                                       char *text,
                                       uintptr_t size);
+
+/**
+ * The table of all functions, so that `dlsym` needs one name: "gib_api".
+ *
+ * @param version pass `GIB_ABI_VERSION`.
+ * @return a table that lives as long as the library is loaded and is never freed; NULL when this library cannot serve
+ * that version, because its major differs or its minor is older.
+ *
+ * [thread: any] [real-time: yes] [state: any]
+ */
+const struct gib_api_table *gib_api(uint32_t version);
 
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
@@ -5749,17 +5760,6 @@ int32_t gib_vibration_result(const struct gib_vibration *handle, struct gib_vibr
  * `handle` is NULL or an instance; `detail` is NULL or writable.
  */
 int32_t gib_vibration_last_error(const struct gib_vibration *handle, struct gib_error_detail *detail);
-
-/**
- * The table of all functions, so that `dlsym` needs one name: "gib_api".
- *
- * @param version pass `GIB_ABI_VERSION`.
- * @return a table that lives as long as the library is loaded and is never freed; NULL when this library cannot serve
- * that version, because its major differs or its minor is older.
- *
- * [thread: any] [real-time: yes] [state: any]
- */
-const struct gib_api_table *gib_api(uint32_t version);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -3,12 +3,13 @@
 //! `include/gib.h` is generated from the files of this room, from `error.rs` and from the `repr(C)` types of the
 //! cycle room: their comments are the C programmer's manual. `make header` writes it anew.
 //!
-//! To add a family: one file here, one block of pointers in `api.rs`.
+//! To add a family: one file here, one block of pointers in `api.rs` and one of functions in `entry.rs`.
 
 pub mod api;
 pub mod backlash;
 pub mod calibration;
 pub mod diagnosis;
+pub mod entry;
 pub mod guard;
 pub mod homing;
 pub mod inertia;
