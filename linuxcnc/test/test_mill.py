@@ -17,6 +17,8 @@ import time
 import hal
 import linuxcnc
 
+import cost
+
 command, stat, errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()
 pins = hal.component("gib-test")
 pins.ready()
@@ -92,6 +94,25 @@ def lost_motion(joint):
     of = f"gib-sim-axis.{joint}."
     on_table = (1 - pin(of + "motor-share")) * pin(of + "friction")
     return 1e3 * (pin(of + "clearance") + 2 * on_table / pin(of + "stiffness"))
+
+
+def counted():
+    """Instructions of each function of the servo thread, while all axes move and the spindle speed varies."""
+    machine_on()
+    home_all()
+    mdi("M68 E0 Q0.5")
+    mdi("M3 S600")
+    time.sleep(3)
+    mdi("M113 P20 Q2")
+    command.mdi("G1 X60 Y60 Z60 F600")
+    wait(lambda: pin("gib-inertia.0.varying"), 30, "the speed varies")
+    rtapi = subprocess.run(["pgrep", "-f", "bin/rtapi_counted"], capture_output=True, text=True, check=True).stdout.split()[0]
+    subprocess.run(["callgrind_control", "-i", "on", rtapi], check=True)
+    time.sleep(5)
+    subprocess.run(["callgrind_control", "-i", "off", rtapi], check=True)
+    subprocess.run(["callgrind_control", "-d", rtapi], check=True)
+    time.sleep(1)
+    check(cost.judge(cost.read(glob.glob("callgrind.out*"))), "gib within its share of motion-controller")
 
 
 def amounts_kept():
@@ -361,6 +382,8 @@ def main(names):
         killed(names[1])
     elif names == ["restarted"]:
         restarted()
+    elif names == ["cost"]:
+        counted()
     else:
         for test in TESTS:
             if not names or test is homing or test.__name__ in names:
