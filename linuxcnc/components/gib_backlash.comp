@@ -61,6 +61,7 @@ variable int wait = 0;
 variable unsigned asked = 0;
 variable int fault = 0;
 variable int running = 0;
+variable int owed = 0; /* gib waits for an acknowledgement */
 variable int started = 0;
 variable int restored = 0;
 
@@ -133,9 +134,29 @@ static void report_it(struct __comp_state *__comp_inst, int32_t status)
     error = status == GIB_DONE ? 0 : status;
 }
 
+/* The usual cycle: nothing is asked for, positions pass through. */
+static int quiet(struct __comp_state *__comp_inst)
+{
+    if (running || owed || start || restore || back != 0.0) {
+        return 0;
+    }
+    started = restored = 0;
+    drive_cmd = cmd_safe;
+    position_fb = drive_safe;
+    busy = 0;
+    return 1;
+}
+
+/* What stands on pins in every cycle. */
+static void show(struct __comp_state *__comp_inst)
+{
+    compensation = amount;
+    active = fabs(2.0 * fabs(backlash_corr) - amount) < 1e-6;
+    ok = ok_in && !fault;
+}
+
 FUNCTION(_)
 {
-    gib_backlash_input in;
     int32_t status;
 
     /* What is no number goes nowhere: the last safe value stays, and motion is told. */
@@ -143,6 +164,10 @@ FUNCTION(_)
         fault = 0;
     }
     fault = held(drive_fb, &drive_safe) && held(position_cmd, &cmd_safe) ? fault : GIB_ERR_NON_FINITE;
+    if (quiet(__comp_inst)) {
+        show(__comp_inst);
+        return;
+    }
     if (start && !started && enable && !busy && !fault) {
         status = begin(__comp_inst, period * 1e-9);
         done = 0;
@@ -155,13 +180,15 @@ FUNCTION(_)
     }
     restored = restore;
 
-    memset(&in, 0, sizeof in);
-    in.position_mm = drive_fb;
-    in.torque = motor_torque;
-    in.compensation_um = 1e3 * amount;
-    in.acknowledged_id = wait == 0 ? asked : 0;
-    in.flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (running && !(start && enable) ? GIB_INPUT_ABORT : 0);
+    gib_backlash_input in = {
+        .position_mm = drive_fb,
+        .torque = motor_torque,
+        .compensation_um = 1e3 * amount,
+        .acknowledged_id = wait == 0 ? asked : 0,
+        .flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (running && !(start && enable) ? GIB_INPUT_ABORT : 0),
+    };
     status = gib_backlash_step(gib, &in, &out);
+    owed = status == GIB_BUSY;
     if (out.request_id != asked) {
         asked = out.request_id;
         amount = 1e-3 * out.compensation_um;
@@ -191,9 +218,7 @@ FUNCTION(_)
         position_fb = drive_safe;
         busy = running;
     }
-    compensation = amount;
-    active = fabs(2.0 * fabs(backlash_corr) - amount) < 1e-6;
     state = out.phase;
     progress = out.progress_ratio;
-    ok = ok_in && !fault;
+    show(__comp_inst);
 }

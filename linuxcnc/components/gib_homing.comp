@@ -109,9 +109,21 @@ static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
     return gib_homing_start(gib, &config);
 }
 
+/* The usual cycle: nobody homes, positions pass through. */
+static int quiet(struct __comp_state *__comp_inst)
+{
+    if (busy || index_enable || owned) {
+        return 0;
+    }
+    drive_cmd = cmd_safe - offset;
+    position_fb = drive_safe + offset;
+    torque_limit_cmd = out.request_id ? out.torque_limit : torque_limit_normal;
+    ok = ok_in && !fault && !out.stop_drive;
+    return 1;
+}
+
 FUNCTION(_)
 {
-    gib_homing_input in;
     gib_homing_report report;
     int32_t status;
 
@@ -120,18 +132,22 @@ FUNCTION(_)
         fault = 0;
     }
     fault = held(drive_fb, &drive_safe) && held(position_cmd, &cmd_safe) ? fault : GIB_ERR_NON_FINITE;
+    if (quiet(__comp_inst)) {
+        return;
+    }
     if (index_enable && enable && !busy && !fault) {
         status = begin(__comp_inst, period * 1e-9);
         fault = status < 0 ? status : 0;
         busy = status == GIB_OK;
         error = status;
     }
-    memset(&in, 0, sizeof in);
-    in.position_mm[0] = drive_fb;
-    in.torque[0] = motor_torque;
-    in.torque_limit = torque_limit_fb;
-    in.acknowledged_id = fabs(torque_limit_fb - out.torque_limit) < 1e-6 ? out.request_id : 0;
-    in.flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (busy && !(index_enable && enable) ? GIB_INPUT_ABORT : 0);
+    gib_homing_input in = {
+        .position_mm = {drive_fb},
+        .torque = {motor_torque},
+        .torque_limit = torque_limit_fb,
+        .acknowledged_id = fabs(torque_limit_fb - out.torque_limit) < 1e-6 ? out.request_id : 0,
+        .flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (busy && !(index_enable && enable) ? GIB_INPUT_ABORT : 0),
+    };
     status = gib_homing_step(gib, &in, &out);
 
     if (out.owns_motion) {

@@ -123,9 +123,11 @@ static int32_t begin_to_vary(struct __comp_state *__comp_inst, double cycle_s)
 /* One cycle of the measurement; whether it has the spindle. */
 static int measuring(struct __comp_state *__comp_inst, double cycle_s)
 {
-    gib_inertia_input in;
     gib_inertia_report report;
     int32_t status;
+    if (!measure && !measured && !running) {
+        return 0;
+    }
     if (measure && !measured && enable && !fault && speed_cmd == 0.0 && !running) {
         error = begin(__comp_inst, cycle_s);
         done = 0;
@@ -135,12 +137,13 @@ static int measuring(struct __comp_state *__comp_inst, double cycle_s)
         done = 0;
     }
     measured = measure;
-    memset(&in, 0, sizeof in);
-    in.speed_rpm = drive_speed;
-    in.torque = motor_torque;
     /* A speed that is commanded meanwhile ends the measurement: the operator wants something else. */
-    in.flags = (drive_fault ? GIB_INPUT_FAULT : 0) |
-               (running && !(measure && enable && speed_cmd == 0.0) ? GIB_INPUT_ABORT : 0);
+    gib_inertia_input in = {
+        .speed_rpm = drive_speed,
+        .torque = motor_torque,
+        .flags = (drive_fault ? GIB_INPUT_FAULT : 0) |
+                 (running && !(measure && enable && speed_cmd == 0.0) ? GIB_INPUT_ABORT : 0),
+    };
     status = gib_inertia_step(gib, &in, &out);
     if (running && status != GIB_BUSY) {
         running = 0;
@@ -160,7 +163,6 @@ static int measuring(struct __comp_state *__comp_inst, double cycle_s)
 /* One cycle of the variation: the speed to be commanded. */
 static double varied(struct __comp_state *__comp_inst, double cycle_s)
 {
-    gib_speed_variation_input in;
     double wanted = speed_cmd;
     int at_speed = fabs(wanted) > 1.0 && fabs(drive_speed - wanted) < 0.05 * fabs(wanted);
     int may = vary && enable && !fault && ina > 0.0;
@@ -173,11 +175,12 @@ static double varied(struct __comp_state *__comp_inst, double cycle_s)
         vary_message = GIB_ERR_PROGRAM_ABSENT;
     }
     started = started && vary && wanted != 0.0;
-    memset(&in, 0, sizeof in);
-    in.speed_rpm = wanted;
-    in.amplitude_ratio = amplitude;
-    in.period_s = swing_time;
-    in.flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (may && wanted != 0.0 ? 0 : GIB_SPEED_VARIATION_STOP);
+    gib_speed_variation_input in = {
+        .speed_rpm = wanted,
+        .amplitude_ratio = amplitude,
+        .period_s = swing_time,
+        .flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (may && wanted != 0.0 ? 0 : GIB_SPEED_VARIATION_STOP),
+    };
     status = gib_speed_variation_step(variation, &in, &swing);
     if (varying) {
         varying = status == GIB_BUSY;

@@ -95,7 +95,7 @@ FUNCTION(_)
     uint32_t i;
     int32_t status;
     for (i = 0; i < channels; i++) {
-        values[i] = ch(i);
+        values[i] = *__comp_inst->ch[i]; /* what ch(i) reads, without its sum with 0 */
     }
     status = gib_recorder_step(recorder, values, channels);
     recording = status == GIB_BUSY;

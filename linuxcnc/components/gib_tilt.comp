@@ -1,0 +1,167 @@
+component gib_tilt "measures the tilt of the workpiece from the spindle load, and moves z along with it";
+description
+"""
+For machines of three axes: z follows the workpiece's plane. Stands between \\fBjoint.2.motor-pos-cmd\\fR and what follows it in the
+chain to the z drive, and takes the offset off again on the way back, so that the planner knows nothing of it.
+
+\\fBstart\\fR rising arms a measurement. While \\fBcutting\\fR is true, with spindle and feed as in the table, the load along the path
+is read; \\fBfinish\\fR rising evaluates it. A tilt beyond its uncertainty raises \\fBwarn\\fR: \\fBaccept\\fR brings z's offset in,
+\\fBoff\\fR declines, and later takes it out again.
+
+The table of loads, \\fBdepth-NN\\fR and \\fBload-NN\\fR, holds for one tool, material, speed and feed; rows up to the first depth of 0.
+A parameter left at 0 takes the default of gib_tilt_config in gib.h.
+""";
+include "gib.h";
+
+pin in float x "commanded position from joint.0.pos-cmd, mm";
+pin in float y "commanded position from joint.1.pos-cmd, mm";
+pin in float z "commanded position from joint.2.pos-cmd, mm";
+pin in float position_cmd "from joint.2.motor-pos-cmd, mm";
+pin out float position_fb "to joint.2.motor-pos-fb, mm";
+pin out float drive_cmd "the same with the offset, mm";
+pin in float drive_fb "position from what follows, mm";
+pin in float spindle_load "spindle load, A or %";
+pin in float speed "spindle speed, rpm";
+pin in bit enable "the machine is on";
+pin in bit drive_fault "a drive is faulted";
+pin in bit start "rising: arm a measurement";
+pin in bit cutting "the tool cuts at feed";
+pin in bit finish "rising: the path is finished";
+pin in bit accept "rising: bring the offset in";
+pin in bit off "rising: decline, or take the offset out";
+pin in bit ok_in = true "of the component before in the chain";
+pin out bit ok = false "false: a fault; chain it to motion.enable";
+pin out bit busy = false "measuring, or an offset is in force or moving";
+pin out bit warn = false "a tilt was found: accept, or off";
+pin out bit active = false "the offset is in force";
+pin out s32 error = 0 "0, or the gib status that ended the last measurement";
+pin out s32 state = 0 "GIB_TILT_ phase";
+pin out s32 verdict = 0 "GIB_TILT_ decision: 1 in band, 2 not significant, 3 significant, 5 declined";
+pin out float tilt "angle of the workpiece's plane, degrees";
+pin out float uncertainty "its uncertainty, k = 2, degrees";
+pin out float offset_z "offset of z now, mm";
+
+param rw float depth_##[8] = 0 "table: depth of cut, rising, mm";
+param rw float load_##[8] = 0 "table: load at that depth, rising, A or %";
+param rw float table_speed = 600 "spindle speed of the table, rpm";
+param rw float table_feed = 600 "feed of the table, mm/min";
+param rw s32 dc_load = 0 "1: the load is a DC signal in %; 0: the rectified current of a motor phase";
+param rw s32 motor_pole_pairs = 0 "of the spindle motor, for a current";
+param rw float entry = 0 "length at both ends of a pass that does not count, mm";
+param rw float band = 0 "a tilt up to this is left alone, degrees";
+param rw float offset_most = 0 "largest offset of z, mm";
+
+variable gib_tilt *gib;
+variable gib_tilt_output out;
+variable double cmd_safe = 0.0;
+variable double fb_safe = 0.0;
+variable int started = 0;
+variable unsigned accepted = 0;
+variable int fault = 0;
+
+option extra_setup yes;
+option extra_cleanup yes;
+function _ fp "once per servo cycle, after motion-controller, before gib_backlash of z";
+license "MIT OR Apache-2.0";
+author "the gib project";
+;;
+#include <math.h>
+#include <string.h>
+
+EXTRA_SETUP()
+{
+    gib = gib_tilt_new();
+    return gib ? 0 : -1;
+}
+
+EXTRA_CLEANUP()
+{
+    struct __comp_state *__comp_inst;
+    for (__comp_inst = __comp_first_inst; __comp_inst; __comp_inst = __comp_inst->_next) {
+        gib_tilt_free(gib);
+    }
+}
+
+static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
+{
+    static const gib_tilt_config defaults = {.struct_size = sizeof defaults};
+    gib_tilt_config config = defaults;
+    gib_tilt_table table;
+    int i;
+    memset(&table, 0, sizeof table);
+    table.struct_size = sizeof table;
+    table.condition = (gib_tilt_condition){1, 1, table_speed, table_feed};
+    table.signal = dc_load ? GIB_TILT_DC_LOAD : GIB_TILT_AC_CURRENT;
+    for (i = 0; i < 8 && depth(i) > 0.0; i++) {
+        table.depth_mm[i] = depth(i);
+        table.load[i] = load(i);
+        table.rows = i + 1;
+    }
+    config.cycle_s = cycle_s;
+    config.signal = table.signal;
+    config.condition = table.condition;
+    config.pole_pairs = motor_pole_pairs;
+    config.entry_mm = entry;
+    config.band_deg = band;
+    config.offset_max_mm = offset_most;
+    config.ack_timeout_s = 3600.0;
+    return gib_tilt_start(gib, &config, &table);
+}
+
+/* What the measurement found, once it is evaluated. */
+static void show(struct __comp_state *__comp_inst)
+{
+    gib_tilt_report report;
+    if (gib_tilt_result(gib, &report) == GIB_OK) {
+        tilt = report.tilt_deg;
+        uncertainty = report.uncertainty_deg;
+        verdict = report.decision;
+    }
+}
+
+FUNCTION(_)
+{
+    int32_t status;
+    if (!enable) {
+        fault = 0;
+    }
+    if (!isfinite(position_cmd) || !isfinite(drive_fb)) {
+        /* What is no number goes nowhere: the last safe value stays, and motion is told. */
+        fault = GIB_ERR_NON_FINITE;
+    } else {
+        cmd_safe = position_cmd;
+        fb_safe = drive_fb;
+    }
+    if (start && !started && enable && !busy && !fault) {
+        error = begin(__comp_inst, period * 1e-9);
+        busy = error == GIB_OK;
+        verdict = 0;
+    }
+    started = start;
+    if (busy) {
+        gib_tilt_input in = {
+            .position_mm = {x, y, z},
+            .load = spindle_load,
+            .speed_rpm = speed,
+            .acknowledged_id = accepted,
+            .flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (cutting ? GIB_TILT_INPUT_CUTTING : 0) |
+                     (finish ? GIB_TILT_INPUT_END : 0) | (off ? GIB_TILT_INPUT_OFF : 0),
+        };
+        int before = out.phase;
+        status = gib_tilt_step(gib, &in, &out);
+        accepted = accept ? out.request_id : accepted;
+        busy = status == GIB_BUSY;
+        if (out.phase != before) {
+            show(__comp_inst);
+            error = status < 0 ? status : 0;
+            fault = status == GIB_ERR_NON_FINITE ? status : fault;
+        }
+        warn = out.warning;
+        active = out.phase == GIB_TILT_ACTIVE;
+        state = out.phase;
+        offset_z = out.offset_mm[2];
+    }
+    drive_cmd = cmd_safe + offset_z;
+    position_fb = fb_safe - offset_z;
+    ok = ok_in && !fault;
+}
