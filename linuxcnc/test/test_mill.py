@@ -374,6 +374,14 @@ def restarted():
     wait(lambda: not amounts_kept()["unfinished"], 2, "told once")
 
 
+def put_back():
+    """The amount of before the measurement, by M-code. What follows starts again from an amount as if measured."""
+    mdi("M111 P0")
+    check(pin("ini.0.backlash") == 0 and amounts_kept()["joints"]["0"] == 0, f"M111 puts back what was before: {told()}")
+    with open("gib-amounts.json", "w", encoding="utf-8") as file:
+        json.dump({"joints": {"0": 0.055}, "unfinished": {}}, file)
+
+
 def tilt_followed():
     """A workpiece that lies askew in x is cut twice: the depth along the path varies, and then does not."""
     def cut(*ways):
@@ -405,8 +413,27 @@ def tilt_followed():
     mdi("M5")
 
 
-TESTS = [homing, refused, inertia_and_variation, lost_motion_measured, abort_restores, diagnosed, tilt_followed,
-         no_number_reaches_motion]
+def vibration_corrected():
+    """Seat and bearing swing with the spindle: the corrected position is nearer to the truth than the scale."""
+    mdi("M3 S600")
+    hal.set_p("gib-vibration.0.on", "1")
+    wait(lambda: pin("gib-vibration.0.blend") > 0.999, 10, "the correction is in force")
+    time.sleep(1)
+    path = recorded(lambda: mdi("G4 P1.5"))
+    scale, corrected, true = columns(path, "x.table_position_mm", "work.corrected_position_mm", "work.true_position_mm")
+
+    def error(position):
+        return 1e3 * math.sqrt(sum((a - b) ** 2 for a, b in zip(position, true)) / len(true))
+    check(error(scale) > 5 and error(corrected) < 0.1 * error(scale),
+          f"position of the tool is wrong by {error(scale):.2f} um RMS on the scale, {error(corrected):.2f} corrected")
+    hal.set_p("gib-vibration.0.on", "0")
+    wait(lambda: pin("gib-vibration.0.correction") == 0, 5, "the correction fades out")
+    check(pin("gib-vibration.0.error") == 0, "and ends well")
+    mdi("M5")
+
+
+TESTS = [homing, refused, inertia_and_variation, lost_motion_measured, abort_restores, put_back, diagnosed,
+         tilt_followed, vibration_corrected, no_number_reaches_motion]
 
 
 def main(names):
