@@ -104,6 +104,7 @@ def counted():
     mdi("M3 S600")
     time.sleep(3)
     mdi("M113 P20 Q2")
+    hal.set_p("gib-vibration.0.on", "1")
     command.mdi("G1 X60 Y60 Z60 F200")
     wait(lambda: pin("gib-inertia.0.varying"), 30, "the speed varies")
     rtapi = subprocess.run(["pgrep", "-f", "bin/rtapi_counted"], capture_output=True, text=True, check=True).stdout.split()[0]
