@@ -2,13 +2,11 @@
  * Spindle inertia and speed variation on a simulated spindle, printed as tables: how close the inertia comes, what the
  * published limit would draw from the motor and what gib's does, and what the variation is good for.
  */
-#include "gib.h"
-#include "spindle_plant.h"
+#include "spindle_run.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 static void check(int32_t status, const char *what)
 {
@@ -16,33 +14,6 @@ static void check(int32_t status, const char *what)
         fprintf(stderr, "%s: %s\n", what, gib_status_text(status));
         exit(1);
     }
-}
-
-/* One measurement; returns the verdict. */
-static int32_t measure(const spindle_config *sc, gib_inertia_report *report)
-{
-    spindle s;
-    gib_inertia_config c;
-    gib_inertia_output out;
-    int32_t status = GIB_BUSY;
-    gib_inertia *gib = gib_inertia_new();
-    spindle_init(&s, sc);
-    memset(&c, 0, sizeof c);
-    c.struct_size = sizeof c;
-    c.cycle_s = sc->cycle_s;
-    c.speed_high_rpm = 2000.0;
-    c.acceleration_rpm_s = spindle_rpm(0.3 * sc->torque_limit_nm / sc->inertia_kg_m2);
-    check(gib_inertia_start(gib, &c), "start");
-    while (status == GIB_BUSY) {
-        spindle_reading r = spindle_sense(&s);
-        gib_inertia_input in = {r.speed_rpm, r.torque_nm, 0, 0};
-        status = gib_inertia_step(gib, &in, &out);
-        spindle_cycle(&s, out.speed_command_rpm, 0.0);
-    }
-    check(status, "step");
-    status = gib_inertia_result(gib, report);
-    gib_inertia_free(gib);
-    return status;
 }
 
 static void inertia_table(void)
@@ -69,7 +40,8 @@ static void inertia_table(void)
                 sc.torque_noise_nm = 0.03 * rated;
                 sc.outlier_ratio = 0.01;
                 sc.seed = (uint64_t)(1000 * i + 100000 * f + run + 1);
-                check(measure(&sc, &r), "result");
+                gib_inertia_config c = spindle_ramps(&sc, 2000.0, 0.6);
+                check(spindle_measure(&sc, &c, &r), "inertia");
                 double error = fabs(r.total_kg_m2 - inertia[i]);
                 worst = fmax(worst, error / inertia[i]);
                 uncertainty += r.total_uncertainty_kg_m2 / inertia[i] / RUNS;
@@ -82,47 +54,6 @@ static void inertia_table(void)
     }
 }
 
-static gib_speed_variation_config example(void)
-{
-    gib_speed_variation_config c;
-    memset(&c, 0, sizeof c);
-    c.struct_size = sizeof c;
-    c.cycle_s = 0.001;
-    c.speed_rpm = 1000.0;
-    c.amplitude_ratio = 0.1;
-    c.period_s = 2.0;
-    c.inertia_kg_m2 = 0.5;
-    c.power_w = 10000.0;
-    return c;
-}
-
-/* Runs a variation for some periods on a spindle and returns what the power meter saw, W. */
-static double power_meter(const gib_speed_variation_config *c)
-{
-    spindle_config sc = spindle_default();
-    spindle s;
-    gib_speed_variation_input in = {c->speed_rpm, 0.0, 0.0, 0.0, 0, 0};
-    gib_speed_variation_output out;
-    gib_speed_variation *gib = gib_speed_variation_new();
-    sc.coulomb_nm = c->coulomb_nm;
-    sc.viscous_nm_s = c->viscous_nm_s;
-    sc.cutting_nm = c->cutting_nm;
-    sc.ripple_nm = 0.0;
-    sc.torque_limit_nm = 1e6; /* what is drawn, not what a drive would cut off */
-    spindle_init(&s, &sc);
-    for (int i = 0; i < 5000; i++) {
-        spindle_cycle(&s, c->speed_rpm, 0.0);
-    }
-    s.peak_w = 0.0;
-    check(gib_speed_variation_start(gib, c), "start");
-    for (int i = 0; i < (int)(4.0 * c->period_s / c->cycle_s); i++) {
-        check(gib_speed_variation_step(gib, &in, &out), "step");
-        spindle_cycle(&s, out.speed_command_rpm, out.torque_nm);
-    }
-    gib_speed_variation_free(gib);
-    return s.peak_w;
-}
-
 static void power_table(void)
 {
     printf("\nPower drawn at the limit: J 0.5 kg.m2, 1000 rpm, motor 10 kW; the meter is the spindle's\n");
@@ -132,7 +63,7 @@ static void power_table(void)
     static const double periods[] = {1.0, 2.0, 4.0};
     for (int n = 0; n < 4; n++) {
         for (int p = 0; p < 3; p++) {
-            gib_speed_variation_config c = example();
+            gib_speed_variation_config c = variation_example();
             gib_speed_variation_limits limits;
             c.period_s = periods[p];
             c.waveform = n == 3;
@@ -145,8 +76,39 @@ static void power_table(void)
             check(gib_speed_variation_possible(&c, &limits), "limits");
             c.amplitude_ratio = n == 0 ? fmin(limits.published_amplitude_ratio, 0.99) : limits.amplitude_ratio;
             printf("%-34s %7.1fs %9.1f%% %10.3f\n", p == 0 ? names[n] : "", periods[p], 100.0 * c.amplitude_ratio,
-                   power_meter(&c) / c.power_w);
+                   variation_power(&c));
         }
+    }
+}
+
+/* Any spindle and motor: what they draw at the limit that gib gives. */
+static void random_power_table(void)
+{
+    enum { RUNS = 150 };
+    static double drawn[RUNS];
+    uint64_t seed = 1;
+    int tried = drawn_by_random(seed, drawn, RUNS), inside = 0;
+    for (int i = 0; i < RUNS; i++) {
+        inside += drawn[i] >= 0.97 && drawn[i] <= 1.0;
+    }
+    printf("\nDrawn at gib's limit by %d random spindles (seed %d; of %d, the others are not limited by power)\n", RUNS,
+           (int)seed, tried);
+    printf("least %.4f P, 1 in 20 below %.4f P, median %.4f P, 1 in 20 above %.4f P, most %.4f P; %d of %d in 0.97 to 1\n",
+           drawn[0], drawn[RUNS / 20], drawn[RUNS / 2], drawn[RUNS - 1 - RUNS / 20], drawn[RUNS - 1], inside, RUNS);
+}
+
+/* Any spindle: how close the inertia comes, also where the signals are worse than a drive's should be. */
+static void random_inertia_table(void)
+{
+    enum { RUNS = 40 };
+    static double errors[RUNS];
+    printf("\nInertia of random spindles, J 0.01 to 5 kg.m2, friction 5 to 50 %%, ripple 0.5 to 3 %%, noise 3 %%, %d each\n",
+           RUNS);
+    printf("%-44s %10s %12s %12s\n", "", "median", "worst error", "in interval");
+    for (int k = 0; k < SIGNAL_KINDS; k++) {
+        int inside = errors_of_random(1, (signal_kind)k, errors, RUNS);
+        printf("%-44s %9.2f%% %11.2f%% %8d/%d\n", SIGNAL_NAMES[k], 100.0 * errors[RUNS / 2], 100.0 * errors[RUNS - 1],
+               inside, RUNS);
     }
 }
 
@@ -165,7 +127,7 @@ static void chatter_table(void)
             speeds[i] = spindle_rad_s(mean[m]);
         }
         double constant = chatter_stable_depth_m(&tool, most, speeds, CYCLES, 0.001);
-        gib_speed_variation_config c = example();
+        gib_speed_variation_config c = variation_example();
         gib_speed_variation_limits limits;
         c.speed_rpm = mean[m];
         c.amplitude_ratio = 0.0;
@@ -194,7 +156,9 @@ static void chatter_table(void)
 int main(void)
 {
     inertia_table();
+    random_inertia_table();
     power_table();
+    random_power_table();
     chatter_table();
     return 0;
 }

@@ -45,6 +45,7 @@ spindle_config spindle_default(void)
     c.torque_noise_nm = 1.8;
     c.speed_grid_rpm = 0.05;
     c.bandwidth_1_s = 60.0;
+    c.substeps = 20;
     c.seed = 1;
     return c;
 }
@@ -60,14 +61,17 @@ spindle_reading spindle_sense(spindle *s)
 {
     spindle_reading r;
     double grid = s->c.speed_grid_rpm, weakening = spindle_rad_s(s->c.weakening_rpm);
-    double reported = s->torque;
+    double reported = s->past[s->c.torque_late_cycles];
     if (weakening > 0.0 && fabs(s->w) > weakening) {
         reported *= fabs(s->w) / weakening;
     }
     r.speed_rpm = grid > 0.0 ? grid * floor(spindle_rpm(s->w) / grid + 0.5) : spindle_rpm(s->w);
-    r.torque_nm = reported + s->c.torque_noise_nm * normal(&s->random);
+    r.torque = reported + s->c.torque_noise_nm * normal(&s->random);
     if (uniform(&s->random) < s->c.outlier_ratio) {
-        r.torque_nm += (uniform(&s->random) - 0.5) * 8.0 * s->c.torque_limit_nm;
+        r.torque += (uniform(&s->random) - 0.5) * 8.0 * s->c.torque_limit_nm;
+    }
+    if (s->c.torque_constant_nm_a > 0.0) {
+        r.torque /= s->c.torque_constant_nm_a;
     }
     return r;
 }
@@ -75,18 +79,20 @@ spindle_reading spindle_sense(spindle *s)
 void spindle_cycle(spindle *s, double command_rpm, double feed_forward_nm)
 {
     const spindle_config *c = &s->c;
-    const int substeps = 20;
-    double dt = c->cycle_s / substeps;
-    double error = spindle_rad_s(command_rpm) - s->w;
+    double dt = c->cycle_s / c->substeps;
+    /* A command is where the speed is to be at the end of its cycle: now it is to be where the one before said. */
+    double error = s->due - s->w;
+    s->due = spindle_rad_s(command_rpm);
     double gain = c->bandwidth_1_s * c->inertia_kg_m2;
     double wanted = gain * (error + s->integral) + feed_forward_nm;
     double limited = fmin(fmax(wanted, -c->torque_limit_nm), c->torque_limit_nm);
     if (limited == wanted) {
         s->integral += error * c->cycle_s * c->bandwidth_1_s / 4.0;
     }
-    for (int i = 0; i < substeps; i++) {
+    for (int i = 0; i < c->substeps; i++) {
         s->torque += (limited - s->torque) * dt / 0.0004;
-        double drive = s->torque + c->ripple_nm * sin(c->ripples_per_turn * s->angle) - c->cutting_nm * (s->w > 0.0);
+        double cutting = s->w > 0.0 ? c->cutting_nm : s->w < 0.0 ? -c->cutting_nm : 0.0;
+        double drive = s->torque + c->ripple_nm * sin(c->ripples_per_turn * s->angle) - cutting;
         if (s->w == 0.0 && fabs(drive) <= c->coulomb_nm) {
             continue;
         }
@@ -96,6 +102,8 @@ void spindle_cycle(spindle *s, double command_rpm, double feed_forward_nm)
         s->angle += s->w * dt;
         s->peak_w = fmax(s->peak_w, s->torque * s->w);
     }
+    memmove(s->past + 1, s->past, sizeof s->past - sizeof *s->past);
+    s->past[0] = s->torque;
 }
 
 /* The tool's position one revolution ago: found by angle, which only grows, between two stored steps. */

@@ -11,6 +11,8 @@
 
 #include <stdint.h>
 
+enum { SPINDLE_LATEST = 3 };
+
 typedef struct {
     double cycle_s;
     double inertia_kg_m2;
@@ -23,8 +25,11 @@ typedef struct {
     double torque_noise_nm; /* standard deviation of one torque sample */
     double outlier_ratio;   /* share of torque samples that are wild */
     double speed_grid_rpm;
+    double torque_constant_nm_a; /* the drive reports a current; 0: it reports torque */
+    int torque_late_cycles;      /* the torque reported is this old, up to SPINDLE_LATEST */
     double weakening_rpm; /* above: the drive reports w/w_b times the torque delivered; 0: never */
     double bandwidth_1_s; /* of the speed loop */
+    int substeps;         /* of the integration in a cycle */
     uint64_t seed;
 } spindle_config;
 
@@ -32,13 +37,16 @@ typedef struct {
     spindle_config c;
     double w, angle; /* rad/s, rad */
     double torque;   /* delivered, N·m */
+    double past[SPINDLE_LATEST + 1]; /* torque of this cycle and those before */
+    double due; /* speed that was commanded for the end of the cycle before, rad/s */
     double integral;
     double peak_w; /* power meter: largest of the motor's shaft power since it was cleared, W */
     uint64_t random;
 } spindle;
 
 typedef struct {
-    double speed_rpm, torque_nm;
+    double speed_rpm;
+    double torque; /* N·m, or A where there is a torque constant */
 } spindle_reading;
 
 spindle_config spindle_default(void);

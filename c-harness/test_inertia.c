@@ -30,7 +30,7 @@ static int32_t run(gib_inertia *gib, spindle *s, int at, uint32_t input_flags)
     int32_t status = GIB_BUSY;
     for (int i = 0; i < 200000 && status == GIB_BUSY; i++) {
         spindle_reading r = spindle_sense(s);
-        gib_inertia_input in = {r.speed_rpm, r.torque_nm, i == at ? input_flags : 0, 0};
+        gib_inertia_input in = {r.speed_rpm, r.torque, i == at ? input_flags : 0, 0};
         status = gib_inertia_step(gib, &in, &out);
         assert_true(isfinite(out.speed_command_rpm));
         assert_int_equal(out.status, status);
@@ -96,7 +96,7 @@ static void steady_speed_is_refused_with_a_ramp(void **state)
     int32_t status = GIB_BUSY;
     while (status == GIB_BUSY) {
         spindle_reading r = spindle_sense(&s);
-        gib_inertia_input in = {r.speed_rpm, r.torque_nm, 0, 0};
+        gib_inertia_input in = {r.speed_rpm, r.torque, 0, 0};
         gib_inertia_output out;
         status = gib_inertia_step(gib, &in, &out);
         assert_int_equal(out.owns_motion, 0);

@@ -4,6 +4,7 @@
  */
 #include "kernel.h"
 #include "realtime.h"
+#include "spindle_plant.h"
 
 #include <setjmp.h>
 #include <signal.h>
@@ -117,6 +118,124 @@ static int32_t recorder_cycle(void)
     return status == GIB_BUSY ? 1 : status == GIB_ERR_RECORDER_COUNT ? 2 : status == GIB_ERR_ABORTED ? 3 : 0;
 }
 
+/* Inertia: short measurements one after the other, commanded or listened to, some aborted, faulted or fed with NaN. */
+static struct {
+    spindle spindle;
+    gib_inertia *gib;
+    gib_inertia_config config;
+    gib_inertia_output out;
+    uint64_t run, cycle_of_run, waits;
+    double outputs[2];
+} inertia;
+
+static void inertia_prepare(void)
+{
+    spindle_config c = spindle_default();
+    c.substeps = 4; /* the plant is not what is timed */
+    c.outlier_ratio = 0.01;
+    memset(&inertia, 0, sizeof inertia);
+    spindle_init(&inertia.spindle, &c);
+    inertia.gib = gib_inertia_new();
+    gib_inertia_config config = {.struct_size = sizeof config,
+                                 .cycle_s = c.cycle_s,
+                                 .speed_high_rpm = 500.0,
+                                 .acceleration_rpm_s = 1000.0,
+                                 .lag_limit_rpm = 450.0, /* it is put to flight by faults */
+                                 .listen_s = 1.5};
+    inertia.config = config;
+}
+
+static int32_t inertia_cycle(void)
+{
+    static const uint32_t kinds = 7;
+    spindle_reading r = spindle_sense(&inertia.spindle);
+    gib_inertia_input in = {r.speed_rpm, r.torque, 0, 0};
+    uint64_t kind = inertia.run % kinds, at = 10 + 61 * (inertia.run % 41);
+    int listens = inertia.config.mode == GIB_INERTIA_LISTEN;
+    if (inertia.cycle_of_run == at) {
+        in.flags = kind == 2 ? GIB_INPUT_ABORT : kind == 3 ? GIB_INPUT_FAULT : listens ? GIB_INERTIA_FINISH : 0;
+        in.torque = kind == 4 ? 0.0 / 0.0 : in.torque;
+        in.speed_rpm = kind == 5 ? 1.0 / 0.0 : in.speed_rpm;
+    }
+    inertia.cycle_of_run++;
+    int32_t status = gib_inertia_step(inertia.gib, &in, &inertia.out);
+    inertia.outputs[0] = inertia.out.speed_command_rpm;
+    inertia.outputs[1] = inertia.out.progress_ratio;
+    double swinging = 200.0 + 150.0 * ((double)(inertia.cycle_of_run % 1000) - 500.0) / 500.0;
+    spindle_cycle(&inertia.spindle, listens && status == GIB_BUSY ? swinging : inertia.out.speed_command_rpm, 0.0);
+    if (status != GIB_BUSY && ++inertia.waits > 50) {
+        inertia.waits = inertia.cycle_of_run = 0;
+        inertia.run++;
+        inertia.config.mode = inertia.run % 3 == 2 ? GIB_INERTIA_LISTEN : GIB_INERTIA_RAMP;
+        inertia.config.speed_high_rpm = inertia.run % 2 ? -500.0 : 500.0;
+        gib_inertia_start(inertia.gib, &inertia.config);
+    }
+    return inertia.out.phase;
+}
+
+/* Speed variation: both shapes, everything changed at random, stopped, aborted, faulted, fed with NaN. */
+static struct {
+    gib_speed_variation *gib;
+    gib_speed_variation_config config;
+    gib_speed_variation_input in;
+    uint64_t random, run, cycle_of_run, waits;
+    double outputs[5];
+} variation;
+
+static double variation_random(double low, double high)
+{
+    variation.random = variation.random * 6364136223846793005u + 1442695040888963407u;
+    return low + (high - low) * (double)(variation.random >> 11) / 9007199254740992.0;
+}
+
+static void variation_prepare(void)
+{
+    memset(&variation, 0, sizeof variation);
+    variation.gib = gib_speed_variation_new();
+    gib_speed_variation_config config = {.struct_size = sizeof config,
+                                         .cycle_s = 0.001,
+                                         .speed_rpm = 1000.0,
+                                         .amplitude_ratio = 0.1,
+                                         .period_s = 2.0,
+                                         .inertia_kg_m2 = 0.5,
+                                         .power_w = 10000.0,
+                                         .torque_nm = 120.0,
+                                         .coulomb_nm = 5.0,
+                                         .viscous_nm_s = 0.02,
+                                         .speed_min_rpm = 100.0,
+                                         .speed_max_rpm = 3000.0};
+    variation.config = config;
+    variation.in.speed_rpm = 1000.0;
+}
+
+static int32_t variation_cycle(void)
+{
+    gib_speed_variation_input in = variation.in;
+    gib_speed_variation_output out;
+    uint64_t kind = variation.run % 6;
+    if (variation.cycle_of_run == 2000) {
+        in.flags = kind == 0 ? GIB_INPUT_ABORT : kind == 1 ? GIB_INPUT_FAULT : kind < 5 ? GIB_SPEED_VARIATION_STOP : 0;
+        in.cutting_nm = kind == 5 ? 0.0 / 0.0 : in.cutting_nm;
+    } else if (variation_random(0.0, 1.0) < 0.01) {
+        variation.in.speed_rpm = variation_random(300.0, 2500.0);
+        variation.in.amplitude_ratio = variation_random(0.0, 0.9);
+        variation.in.period_s = variation_random(0.1, 5.0);
+        variation.in.cutting_nm = variation_random(0.0, 30.0);
+    }
+    variation.cycle_of_run++;
+    int32_t status = gib_speed_variation_step(variation.gib, &in, &out);
+    double numbers[] = {out.speed_command_rpm, out.torque_nm, out.amplitude_ratio, out.amplitude_limit_ratio,
+                        out.period_limit_s};
+    memcpy(variation.outputs, numbers, sizeof numbers);
+    if (status != GIB_BUSY && ++variation.waits > 50) {
+        variation.waits = variation.cycle_of_run = 0;
+        variation.run++;
+        variation.config.waveform = (int32_t)(variation.run / 2 % 2);
+        gib_speed_variation_start(variation.gib, &variation.config);
+    }
+    return out.phase;
+}
+
 /* Further families go here. `phases`: those that the million cycles must have been in, one bit each. */
 static const struct {
     realtime_family family;
@@ -124,6 +243,9 @@ static const struct {
 } FAMILIES[] = {
     {{"backlash", backlash_prepare, backlash_cycle, backlash.outputs, 5}, (1u << (GIB_BACKLASH_FAILED + 1)) - 1u},
     {{"recorder", recorder_prepare, recorder_cycle, recorder.outputs, 12}, 1u << 1 | 1u << 2 | 1u << 3},
+    {{"inertia", inertia_prepare, inertia_cycle, inertia.outputs, 2}, (1u << (GIB_INERTIA_FAILED + 1)) - 1u},
+    {{"speed_variation", variation_prepare, variation_cycle, variation.outputs, 5},
+     (1u << (GIB_SPEED_VARIATION_FAILED + 1)) - 1u},
 };
 #define FAMILY_COUNT (sizeof FAMILIES / sizeof *FAMILIES)
 

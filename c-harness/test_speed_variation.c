@@ -1,8 +1,7 @@
 /*
  * Family `speed_variation` from C: the limits, the command on a simulated spindle with a power meter, and every pointer.
  */
-#include "gib.h"
-#include "spindle_plant.h"
+#include "spindle_run.h"
 
 #include <math.h>
 #include <setjmp.h>
@@ -12,52 +11,10 @@
 
 #include <cmocka.h>
 
-/* The source's example: J 0.5, S 1000, P 10 kW, R 2 s. */
-static gib_speed_variation_config example(void)
-{
-    gib_speed_variation_config c;
-    memset(&c, 0, sizeof c);
-    c.struct_size = sizeof c;
-    c.cycle_s = 0.001;
-    c.speed_rpm = 1000.0;
-    c.amplitude_ratio = 0.3;
-    c.period_s = 2.0;
-    c.inertia_kg_m2 = 0.5;
-    c.power_w = 10000.0;
-    return c;
-}
-
-/* Largest motor power over four periods on a spindle without friction, as a share of the limit. */
-static double peak_power(const gib_speed_variation_config *c)
-{
-    spindle_config sc = spindle_default();
-    spindle s;
-    gib_speed_variation_input in = {c->speed_rpm, 0.0, 0.0, 0.0, 0, 0};
-    gib_speed_variation_output out;
-    gib_speed_variation *gib = gib_speed_variation_new();
-    sc.coulomb_nm = c->coulomb_nm;
-    sc.viscous_nm_s = c->viscous_nm_s;
-    sc.cutting_nm = c->cutting_nm;
-    sc.ripple_nm = 0.0;
-    sc.torque_limit_nm = 1e6;
-    spindle_init(&s, &sc);
-    for (int i = 0; i < 5000; i++) {
-        spindle_cycle(&s, c->speed_rpm, 0.0);
-    }
-    assert_int_equal(gib_speed_variation_start(gib, c), GIB_OK);
-    s.peak_w = 0.0;
-    for (int i = 0; i < (int)(4.0 * c->period_s / c->cycle_s); i++) {
-        assert_int_equal(gib_speed_variation_step(gib, &in, &out), GIB_BUSY);
-        spindle_cycle(&s, out.speed_command_rpm, out.torque_nm);
-    }
-    gib_speed_variation_free(gib);
-    return s.peak_w / c->power_w;
-}
-
 static void published_draws_too_much_and_ours_all_there_is(void **state)
 {
     (void)state;
-    gib_speed_variation_config c = example();
+    gib_speed_variation_config c = variation_example();
     gib_speed_variation_limits limits;
     assert_int_equal(gib_speed_variation_possible(&c, &limits), GIB_OK);
     assert_true(fabs(limits.published_amplitude_ratio - 0.9) < 1e-9);
@@ -67,19 +24,19 @@ static void published_draws_too_much_and_ours_all_there_is(void **state)
 
     c.formula = GIB_SPEED_VARIATION_PUBLISHED;
     c.amplitude_ratio = limits.published_amplitude_ratio;
-    double published = peak_power(&c);
+    double published = variation_power(&c);
     assert_true(published > 1.85 && published < 1.91);
 
     for (int waveform = 0; waveform < 2; waveform++) {
         for (int load = 0; load < 2; load++) {
-            c = example();
+            c = variation_example();
             c.waveform = waveform;
             c.coulomb_nm = 8.0 * load;
             c.viscous_nm_s = 0.05 * load;
             c.cutting_nm = 20.0 * load;
             assert_int_equal(gib_speed_variation_possible(&c, &limits), GIB_OK);
             c.amplitude_ratio = limits.amplitude_ratio;
-            double ours = peak_power(&c);
+            double ours = variation_power(&c);
             print_message("waveform %d, load %d: amplitude %.3f draws %.4f P\n", waveform, load,
                           limits.amplitude_ratio, ours);
             assert_true(ours <= 1.0 && ours >= 0.97);
@@ -90,7 +47,7 @@ static void published_draws_too_much_and_ours_all_there_is(void **state)
 static void more_than_possible_is_refused_with_what_is(void **state)
 {
     (void)state;
-    gib_speed_variation_config c = example();
+    gib_speed_variation_config c = variation_example();
     gib_error_detail detail;
     gib_speed_variation *gib = gib_speed_variation_new();
     c.amplitude_ratio = 0.9;
@@ -107,7 +64,7 @@ static void it_starts_and_stops_without_a_jump(void **state)
 {
     (void)state;
     for (int waveform = 0; waveform < 2; waveform++) {
-        gib_speed_variation_config c = example();
+        gib_speed_variation_config c = variation_example();
         gib_speed_variation_input in = {1000.0, 0.0, 0.0, 0.0, 0, 0};
         gib_speed_variation_output out = {0};
         gib_speed_variation *gib = gib_speed_variation_new();
@@ -134,7 +91,7 @@ static void pointers_and_handles_are_checked(void **state)
     (void)state;
     _Alignas(16) static unsigned char memory[4096];
     gib_speed_variation *gib = NULL;
-    gib_speed_variation_config c = example();
+    gib_speed_variation_config c = variation_example();
     gib_speed_variation_input in = {1234.0, 0.0, 0.0, 0.0, 0, 0};
     gib_speed_variation_output out;
     gib_speed_variation_limits limits;

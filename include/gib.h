@@ -345,6 +345,11 @@
 #define GIB_ERR_INERTIA_OWN (-303)
 
 /**
+ * Torque and acceleration do not belong together all along: the torque was stuck, dead, turned round or changed on the way.
+ */
+#define GIB_ERR_INERTIA_TORQUE (-304)
+
+/**
  * The variation asked for needs more power than the motor has; `_last_error` says what is possible.
  */
 #define GIB_ERR_SPEED_VARIATION_POWER (-400)
@@ -4782,8 +4787,9 @@ int32_t gib_inertia_start(struct gib_inertia *handle,
  * @param input measured values of this cycle.
  * @param output command for this cycle; always written when not NULL.
  * @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
- * GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_TORQUE_BOUND, GIB_ERR_LAG; and GIB_ERR_NULL,
- * GIB_ERR_HANDLE of this call.
+ * GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_TORQUE_BOUND, GIB_ERR_LAG, GIB_ERR_CONFIG for
+ * unknown flags; and GIB_ERR_NULL, GIB_ERR_HANDLE of this call. After a fault the command goes back to the speed at
+ * start, no faster than the ramps; after a drive fault gib just lets go.
  *
  * [thread: cycle] [real-time: yes] [state: any]
  *
@@ -4816,14 +4822,15 @@ int32_t gib_inertia_abort(struct gib_inertia *handle);
  * @param handle the instance, after GIB_DONE.
  * @param report receives inertia, friction, uncertainties and the ramp that would do better.
  * @return GIB_OK; GIB_ERR_STATE before GIB_DONE; GIB_ERR_INERTIA_EXCITATION, GIB_ERR_INERTIA_FEW,
- * GIB_ERR_INERTIA_SIGN, GIB_ERR_INERTIA_OWN when the value cannot be used; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ * GIB_ERR_INERTIA_SIGN, GIB_ERR_INERTIA_OWN, GIB_ERR_INERTIA_TORQUE when the value cannot be used; GIB_ERR_NULL, GIB_ERR_HANDLE.
  *
  * [thread: setup] [real-time: no] [state: after GIB_DONE]
  *
  * # Safety
  * `handle` is NULL or an instance; `report` is NULL or writable.
  */
-int32_t gib_inertia_result(struct gib_inertia *handle, struct gib_inertia_report *report);
+int32_t gib_inertia_result(struct gib_inertia *handle,
+                           struct gib_inertia_report *report);
 
 /**
  * The first error of the present run, or why the last call was refused: code, field, value and bounds.

@@ -122,6 +122,8 @@ pub const GIB_ERR_INERTIA_FEW: i32 = -301;
 pub const GIB_ERR_INERTIA_SIGN: i32 = -302;
 /// The inertia found is not above the machine's own: nothing is left for the workpiece.
 pub const GIB_ERR_INERTIA_OWN: i32 = -303;
+/// Torque and acceleration do not belong together all along: the torque was stuck, dead, turned round or changed on the way.
+pub const GIB_ERR_INERTIA_TORQUE: i32 = -304;
 
 /// The variation asked for needs more power than the motor has; `_last_error` says what is possible.
 pub const GIB_ERR_SPEED_VARIATION_POWER: i32 = -400;
@@ -241,6 +243,7 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_INERTIA_FEW, "too little of the motion can be used for the inertia\0"),
     (GIB_ERR_INERTIA_SIGN, "torque and speed have opposite signs\0"),
     (GIB_ERR_INERTIA_OWN, "the inertia found is not above the machine's own\0"),
+    (GIB_ERR_INERTIA_TORQUE, "torque and acceleration do not belong together all along\0"),
     (GIB_ERR_SPEED_VARIATION_POWER, "the speed variation needs more power than the motor has\0"),
     (GIB_ERR_SPEED_VARIATION_TORQUE, "the speed variation needs more torque than the motor has\0"),
     (GIB_ERR_SPEED_VARIATION_SPEED, "the speed variation leaves the speeds allowed\0"),

@@ -122,8 +122,9 @@ pub unsafe extern "C" fn gib_inertia_start(handle: *mut GibInertia, config: *con
 /// @param input measured values of this cycle.
 /// @param output command for this cycle; always written when not NULL.
 /// @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
-/// GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_TORQUE_BOUND, GIB_ERR_LAG; and GIB_ERR_NULL,
-/// GIB_ERR_HANDLE of this call.
+/// GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_TORQUE_BOUND, GIB_ERR_LAG, GIB_ERR_CONFIG for
+/// unknown flags; and GIB_ERR_NULL, GIB_ERR_HANDLE of this call. After a fault the command goes back to the speed at
+/// start, no faster than the ramps; after a drive fault gib just lets go.
 ///
 /// [thread: cycle] [real-time: yes] [state: any]
 ///
@@ -137,9 +138,41 @@ pub unsafe extern "C" fn gib_inertia_step(
 ) -> i32 {
     // SAFETY: the caller promises each is NULL or valid.
     let (handle, input, output) = unsafe { (handle.as_mut(), input.as_ref(), output.as_mut()) };
+    // Two ways out by turns: checks that lead to one place would be computed and joined, which costs more.
+    let Some(handle) = handle else { return step_refused(None, input, output) };
+    let Some(input) = input else { return step_in_full(Some(handle), None, output) };
+    let Some(output) = output else { return step_refused(Some(handle), Some(input), None) };
+    if handle.alive == ALIVE && handle.machine.quick(input) {
+        let now = handle.machine.output();
+        *output = InertiaOutput { speed_command_rpm: now.speed_command_rpm, ..*now };
+        return output.status;
+    }
+    step_in_full(Some(handle), Some(input), Some(output))
+}
+
+/// A cycle without an instance or an output; `extern "C"` as below.
+#[cold]
+#[inline(never)]
+extern "C" fn step_refused(
+    handle: Option<&mut GibInertia>,
+    input: Option<&InertiaInput>,
+    output: Option<&mut InertiaOutput>,
+) -> i32 {
+    misused(handle, input, output)
+}
+
+/// A cycle that is not a cheap one. `extern "C"`: it cannot unwind, so that it is called by a jump and the cheap cycle saves
+/// no registers.
+#[inline(never)]
+extern "C" fn step_in_full(
+    handle: Option<&mut GibInertia>,
+    input: Option<&InertiaInput>,
+    output: Option<&mut InertiaOutput>,
+) -> i32 {
     match (handle, input, output) {
         (Some(handle), Some(input), Some(output)) if handle.alive == ALIVE => {
-            *output = *handle.machine.step(input);
+            handle.machine.turn(input);
+            *output = *handle.machine.output();
             output.status
         }
         (handle, input, output) => misused(handle, input, output),
@@ -196,7 +229,7 @@ pub unsafe extern "C" fn gib_inertia_abort(handle: *mut GibInertia) -> i32 {
 /// @param handle the instance, after GIB_DONE.
 /// @param report receives inertia, friction, uncertainties and the ramp that would do better.
 /// @return GIB_OK; GIB_ERR_STATE before GIB_DONE; GIB_ERR_INERTIA_EXCITATION, GIB_ERR_INERTIA_FEW,
-/// GIB_ERR_INERTIA_SIGN, GIB_ERR_INERTIA_OWN when the value cannot be used; GIB_ERR_NULL, GIB_ERR_HANDLE.
+/// GIB_ERR_INERTIA_SIGN, GIB_ERR_INERTIA_OWN, GIB_ERR_INERTIA_TORQUE when the value cannot be used; GIB_ERR_NULL, GIB_ERR_HANDLE.
 ///
 /// [thread: setup] [real-time: no] [state: after GIB_DONE]
 ///

@@ -82,6 +82,21 @@ impl fmt::Display for Refusal {
             }
             "acceleration_noise_ratio" => write!(f, ": the acceleration is lost in the noise of the speed"),
             "blocks" => write!(f, ": {value:.0} stretches can be used, {low:.0} are needed"),
+            "torque_stuck_blocks" => {
+                write!(f, ": the torque stays what it is while the spindle speeds up and slows down")
+            }
+            "torque_over_noise" => write!(f, ": the torque is nothing but noise"),
+            "blocks_dropped_ratio" => {
+                write!(
+                    f,
+                    ": {:.0} % of the stretches contradict the others, at most {:.0} % may",
+                    100.0 * value,
+                    100.0 * high
+                )
+            }
+            "halves_apart_ratio" => {
+                write!(f, ": the two halves of the recording differ by {:.0} % of the inertia", 100.0 * value)
+            }
             "own_inertia_kg_m2" => write!(f, ": {high:.6} kg·m² in all, {value:.6} kg·m² given as its own"),
             _ => Ok(()),
         }

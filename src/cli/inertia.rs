@@ -23,6 +23,9 @@ use super::{Answer, Result};
 pub struct InertiaCommand {
     /// The recording: CSV with spindle.speed and spindle.torque (or spindle.current with --torque-constant)
     recording: PathBuf,
+    /// Draw what accelerates and what friction takes, as SVG
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
     /// Answer as JSON
     #[arg(long)]
     json: bool,
@@ -70,6 +73,13 @@ impl InertiaCommand {
         }
         let found = measure(&Recording::open(&self.recording)?, &self.options())?;
         let mut text = if self.json { as_json(&found)? } else { self.text(&found) };
+        if let (Some(path), false) = (&self.plot, found.blocks.is_empty()) {
+            let picture = gib::report::inertia::picture(&found)?;
+            std::fs::write(path, picture).map_err(|why| format!("{}: cannot be written: {why}", path.display()))?;
+            if !self.json {
+                let _ = writeln!(text, "\nPicture: {}", path.display());
+            }
+        }
         if let (Some(file), None) = (&self.program, &found.refused) {
             let value = rounded(&found.report);
             program::set(file, self.step, value, None)?;

@@ -1,5 +1,6 @@
 //! Pictures for people: plots as SVG.
 
+pub mod inertia;
 pub mod lost_motion;
 pub mod plot;
 pub mod residual;

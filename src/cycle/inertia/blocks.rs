@@ -9,12 +9,21 @@
 //! ω' = Σu·ω / (Σψ·Δt),   T̄ = Σψ·T / Σψ,   ω̄ = Σψ·ω / Σψ,   Σψ = Σu² = N(N²−1)/12
 //! ```
 //!
+//! A cycle only adds: S₁ is the sum of the samples x, S₂ the sum of S₁, S₃ that of S₂. When the block is full,
+//!
+//! ```text
+//! 2·Σψ·x = (N+2)·S₂ − (N+1)/2·S₁ − 2·S₃,   Σu·x = (N+1)/2·S₁ − S₂
+//! ```
+//!
 //! Before, a wild sample gives way to the median of itself and its neighbours: one that is sixteen times further from it
 //! than usual (after Hampel; some 4.5 standard deviations of normal noise). Samples that say nothing about inertia
 //! end a block without trace: standing still, take-up, field weakening, saturation.
 
 /// Blocks that a measurement can hold.
 pub const BLOCKS: usize = 512;
+
+/// A speed or torque beyond this, in the unit of the input, is no measurement; its square would not be finite for long.
+const BEYOND: f64 = 1e12;
 
 /// One equation of the torque balance.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -40,57 +49,67 @@ pub struct Gate {
     pub takeup: u32,
 }
 
+/// Speed (rpm) and torque (unit of the input) of one instant, treated alike, side by side: aligned, so that a processor
+/// works on both at once.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(16))]
+struct Sample([f64; 2]);
+
 /// Samples on their way into blocks.
 #[derive(Debug, Clone, Copy)]
 pub struct Gather {
-    gate: Gate,
+    calm: Calm,
+    /// Smallest and largest |sample| that counts.
+    least: Sample,
+    most: Sample,
+    takeup: u32,
+    /// Running sums S₁, S₂, S₃.
+    sums: [Sample; 3],
+    /// Samples to the end of the block, or of what is left out.
+    run: u32,
+    /// True while samples are left out.
+    skips: bool,
     length: u32,
-    left: u32,
-    skip: u32,
-    u: f64,
-    first_u: f64,
-    c: f64,
-    torque: f64,
-    speed: f64,
+    /// What makes Σψ·x a mean in rad/s and N·m, and Σu·ω an acceleration.
+    mean: [f64; 2],
     slope: f64,
-    speeds: Calm,
-    torques: Calm,
-    /// rad/s per rpm over Σψ; N·m per unit of the input over Σψ; and the same as the first, per second.
-    scale: [f64; 3],
     last_torque: f64,
     used: usize,
     blocks: [Block; BLOCKS],
 }
 
-/// One signal on its way past the wild samples.
+/// Both signals on their way past the wild samples.
 #[derive(Debug, Clone, Copy, Default)]
 struct Calm {
-    before: f64,
-    middle: f64,
+    before: Sample,
+    middle: Sample,
     /// Usual distance of a sample from the median of three: the median of these distances, followed by steps up and
     /// down, which a wild one moves no further than any other.
-    usual: f64,
+    usual: Sample,
 }
 
 impl Calm {
     /// The sample before `next`, or the median in its place where it is wild.
     #[inline(always)]
-    fn pass(&mut self, next: f64) -> f64 {
+    fn pass(&mut self, next: Sample) -> Sample {
         const UP: f64 = 1.0 + 1.0 / 16.0;
         const DOWN: f64 = 1.0 / UP;
         const LEAST: f64 = 1e-6;
         const WILD: f64 = 16.0;
-        let (a, b) = (self.before, self.middle);
-        let (low, high) = if a < b { (a, b) } else { (b, a) };
-        let below = if next < high { next } else { high };
-        let median = if low > below { low } else { below };
-        let away = (b - median).abs();
-        let wild = away > WILD * self.usual;
-        let followed = self.usual * if away > self.usual { UP } else { DOWN };
-        self.usual = if followed > LEAST { followed } else { LEAST };
-        self.before = b;
+        let mut passed = Sample::default();
+        for k in 0..2 {
+            let (a, b, c, usual) = (self.before.0[k], self.middle.0[k], next.0[k], self.usual.0[k]);
+            let (low, high) = if a < b { (a, b) } else { (b, a) };
+            let below = if c < high { c } else { high };
+            let median = if low > below { low } else { below };
+            let away = (b - median).abs();
+            passed.0[k] = if away > WILD * usual { median } else { b };
+            let followed = usual * if away > usual { UP } else { DOWN };
+            self.usual.0[k] = if followed > LEAST { followed } else { LEAST };
+        }
+        self.before = self.middle;
         self.middle = next;
-        if wild { median } else { b }
+        passed
     }
 }
 
@@ -106,22 +125,19 @@ impl Gather {
     pub fn new(gate: Gate, length: u32, cycle_s: f64, torque_nm: f64) -> Gather {
         let length = length.max(4);
         let n = f64::from(length);
-        let sum = n * (n * n - 1.0) / 12.0;
+        let weights = n * (n * n - 1.0) / 12.0;
         let rad_s = crate::units::rad_s_from_rpm(1.0);
         Gather {
-            gate,
+            calm: Calm::default(),
+            least: Sample([gate.standstill, 0.0]),
+            most: Sample([gate.base.min(BEYOND), gate.saturation.min(BEYOND)]),
+            takeup: gate.takeup,
+            sums: [Sample::default(); 3],
+            run: gate.takeup.max(2), // the median is full after two samples
+            skips: true,
             length,
-            left: length,
-            skip: gate.takeup.max(2), // the median is full after two samples
-            u: 0.5 * (1.0 - n),
-            first_u: 0.5 * (1.0 - n),
-            c: (n * n - 1.0) / 4.0,
-            torque: 0.0,
-            speed: 0.0,
-            slope: 0.0,
-            speeds: Calm::default(),
-            torques: Calm::default(),
-            scale: [0.5 * rad_s / sum, 0.5 * torque_nm / sum, rad_s / (sum * cycle_s)],
+            mean: [0.5 * rad_s / weights, 0.5 * torque_nm / weights],
+            slope: rad_s / (weights * cycle_s),
             last_torque: 0.0,
             used: 0,
             blocks: [Block::default(); BLOCKS],
@@ -141,65 +157,85 @@ impl Gather {
     }
 
     /// Leaves the next `samples` out and begins a new block after them.
-    #[inline]
     pub fn leave_out(&mut self, samples: u32) {
-        self.skip = samples.max(1);
-        self.restart();
+        self.skips = samples > 0;
+        self.run = if self.skips { samples } else { self.length };
+        self.sums = [Sample::default(); 3];
+    }
+
+    /// Samples that may be [taken](Self::take) before one must be [added](Self::add).
+    #[inline]
+    #[must_use]
+    pub fn quiet(&self) -> u32 {
+        self.run.saturating_sub(1)
+    }
+
+    /// Counts samples that were taken.
+    #[inline]
+    pub fn count(&mut self, taken: u32) {
+        self.run = self.run.saturating_sub(taken);
+    }
+
+    /// Takes a sample in, without counting it; both are finite. False with nothing changed where it must be added.
+    ///
+    /// What is left out is summed up too, and thrown away: that costs less than to ask.
+    #[inline(always)]
+    pub fn take(&mut self, speed_rpm: f64, torque: f64) -> bool {
+        let mut calm = self.calm;
+        let passed = calm.pass(Sample([speed_rpm, torque]));
+        let size = passed.0.map(f64::abs);
+        let counts = |k: usize| (size[k] >= self.least.0[k]) & (size[k] <= self.most.0[k]);
+        if !(counts(0) & counts(1)) {
+            return false;
+        }
+        self.calm = calm;
+        let mut next = passed;
+        for sum in &mut self.sums {
+            *sum = Sample([sum.0[0] + next.0[0], sum.0[1] + next.0[1]]);
+            next = *sum;
+        }
+        true
     }
 
     /// Adds a sample; both are finite.
-    #[inline(always)]
+    #[inline]
     pub fn add(&mut self, speed_rpm: f64, torque: f64) {
-        let speed = self.speeds.pass(speed_rpm);
-        let moment = self.torques.pass(torque);
-        let size = speed.abs();
-        if self.skip != 0 || size < self.gate.standstill || size > self.gate.base || moment.abs() > self.gate.saturation
-        {
-            self.refuse(size);
+        if !self.take(speed_rpm, torque) {
+            self.refuse(Sample([speed_rpm, torque]));
             return;
         }
-        let weight = self.c - self.u * self.u;
-        self.torque += weight * moment;
-        self.speed += weight * speed;
-        self.slope += self.u * speed;
-        self.u += 1.0;
-        self.left -= 1;
-        if self.left == 0 {
+        self.run = self.run.saturating_sub(1);
+        if self.run == 0 {
             self.close();
         }
     }
 
-    #[inline(never)]
-    fn refuse(&mut self, size: f64) {
-        let takeup = if size < self.gate.standstill { self.gate.takeup.max(1) } else { 0 };
-        self.skip = self.skip.saturating_sub(1).max(takeup);
-        self.restart();
+    /// A sample that says nothing about inertia.
+    fn refuse(&mut self, sample: Sample) {
+        let stands = self.calm.pass(sample).0[0].abs() < self.least.0[0];
+        let takeup = if stands { self.takeup.max(1) } else { 0 };
+        let left = if self.skips { self.run.saturating_sub(1) } else { 0 };
+        self.leave_out(left.max(takeup));
     }
 
-    fn restart(&mut self) {
-        self.left = self.length;
-        self.u = self.first_u;
-        self.torque = 0.0;
-        self.speed = 0.0;
-        self.slope = 0.0;
-    }
-
-    #[inline(never)]
     fn close(&mut self) {
+        if self.skips {
+            self.leave_out(0);
+            return;
+        }
+        let n = f64::from(self.length);
+        let [first, second, third] = self.sums.map(|sum| sum.0);
+        let weighted = |k: usize| (n + 2.0) * second[k] - 0.5 * (n + 1.0) * first[k] - 2.0 * third[k];
         let block = Block {
-            torque: self.torque * self.scale[1],
-            speed: self.speed * self.scale[0],
-            acceleration: self.slope * self.scale[2],
+            torque: weighted(1) * self.mean[1],
+            speed: weighted(0) * self.mean[0],
+            acceleration: (0.5 * (n + 1.0) * first[0] - second[0]) * self.slope,
         };
         let same_sense = block.torque * self.last_torque >= 0.0;
         self.last_torque = block.torque;
-        self.restart();
-        if !same_sense {
-            // Belts and gears change flank: what follows accelerates less than the torque says.
-            self.skip = self.gate.takeup;
-            return;
-        }
-        if let Some(place) = self.blocks.get_mut(self.used) {
+        // Belts and gears change flank: what follows accelerates less than the torque says.
+        self.leave_out(if same_sense { 0 } else { self.takeup });
+        if same_sense && let Some(place) = self.blocks.get_mut(self.used) {
             *place = block;
             self.used += 1;
         }

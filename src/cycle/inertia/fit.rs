@@ -5,6 +5,7 @@
 //! constant, the motor delivers ω_b/ω of it), and a torque above which they no longer agree (saturation).
 
 use super::blocks::{BLOCKS, Block};
+use super::doubt::{doubt, stuck};
 use super::robust::{Regression, Reported, Rows};
 use crate::error::{Fault, GIB_ERR_INERTIA_EXCITATION, GIB_ERR_INERTIA_FEW, GIB_ERR_INERTIA_SIGN};
 
@@ -93,7 +94,8 @@ const PARABOLA: f64 = 1.2;
 /// Fits the balance. The balance comes back also when it cannot be used, with as much as is known.
 ///
 /// # Errors
-/// In the second place: `GIB_ERR_INERTIA_FEW`, `GIB_ERR_INERTIA_EXCITATION`, `GIB_ERR_INERTIA_SIGN`.
+/// In the second place: `GIB_ERR_INERTIA_FEW`, `GIB_ERR_INERTIA_EXCITATION`, `GIB_ERR_INERTIA_SIGN`,
+/// `GIB_ERR_INERTIA_TORQUE`.
 pub fn fit(blocks: &[Block], length: u32, question: &Question) -> (Balance, Result<(), Fault>) {
     let mut balance = Balance { both_ways: both_ways(blocks), naive: naive(blocks), ..Balance::default() };
     if blocks.len() < FEWEST {
@@ -110,11 +112,15 @@ pub fn fit(blocks: &[Block], length: u32, question: &Question) -> (Balance, Resu
     balance.left_out = blocks.len() - rows.blocks.iter().filter(|b| rows.counts(b)).count();
     let Some(found) = rows.fit() else {
         balance.ramp = blind_ramp(blocks);
-        return (balance, Err(Fault::of(GIB_ERR_INERTIA_EXCITATION)));
+        let excitation = Fault::of(GIB_ERR_INERTIA_EXCITATION);
+        return (balance, Err(stuck(blocks).unwrap_or(excitation)));
     };
     fill(&mut balance, &found);
     balance.ramp = ramp(&rows, &balance, length, question);
-    let verdict = judge(&balance, &found);
+    let verdict = match doubt(blocks, &rows, &found, balance.both_ways) {
+        Some(fault) => Err(fault),
+        None => judge(&balance, &found),
+    };
     (balance, verdict)
 }
 
@@ -131,7 +137,7 @@ fn judge(balance: &Balance, found: &Regression) -> Result<(), Fault> {
         return Err(Fault { field: "acceleration_noise_ratio\0", ..excitation(found.noise_share, 0.1) });
     }
     let ratio = uncertainty / value.abs();
-    if value <= 0.0 || ratio > WORST {
+    if !(value > 0.0 && ratio <= WORST) {
         return Err(excitation(ratio, WORST));
     }
     Ok(())
@@ -223,7 +229,7 @@ fn threshold(rows: &Rows, largest: f64, reported: impl Fn(f64, &Regression) -> R
 }
 
 /// The quantile `share` of a quantity over the blocks.
-fn quantile(blocks: &[Block], share: f64, of: impl Fn(&Block) -> f64) -> f64 {
+pub(super) fn quantile(blocks: &[Block], share: f64, of: impl Fn(&Block) -> f64) -> f64 {
     let mut values = [0.0; BLOCKS];
     blocks.iter().zip(values.iter_mut()).for_each(|(block, place)| *place = of(block));
     let n = blocks.len().min(BLOCKS);

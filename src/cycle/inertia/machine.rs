@@ -6,9 +6,12 @@ use super::plan::Plan;
 use super::report::InertiaReport;
 use crate::cycle::backlash::io::{GIB_INPUT_ABORT, GIB_INPUT_FAULT};
 use crate::error::{
-    Fault, GIB_BUSY, GIB_DONE, GIB_ERR_ABORTED, GIB_ERR_DRIVE_FAULT, GIB_ERR_LAG, GIB_ERR_NON_FINITE, GIB_ERR_STATE,
-    GIB_ERR_TORQUE_BOUND, GIB_OK,
+    Fault, GIB_BUSY, GIB_DONE, GIB_ERR_ABORTED, GIB_ERR_CONFIG, GIB_ERR_DRIVE_FAULT, GIB_ERR_LAG, GIB_ERR_NON_FINITE,
+    GIB_ERR_STATE, GIB_ERR_TORQUE_BOUND, GIB_OK,
 };
+
+/// Fastest |speed| at which a measurement may be started, rpm: as fast as its ramps may be.
+const FASTEST_START: f64 = 2e5;
 
 /// Where the measurement is. Every state but the resting ones ends after its own number of cycles.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,19 +47,20 @@ pub struct Inertia {
     phase: Phase,
     /// First fault of this run.
     fault: Fault,
-    /// Cycles left to the present state.
+    /// Cycles left to the present state, but for those that are quiet.
     left: u32,
-    /// Change of the command in a cycle, rpm.
-    change: f64,
-    command: f64,
-    /// Limits of this state: a torque and a following error beyond them are faults.
-    torque_bound: f64,
-    lag_limit: f64,
+    /// Cycles in which nothing ends, granted and left of that: they need only the [`quick`](Self::quick) look.
+    granted: i32,
+    quiet: i32,
+    /// Largest following error and torque in this state; what is beyond is a fault.
+    limits: [f64; 2],
+    /// Change of command (rpm) and progress in a cycle.
+    change: [f64; 2],
     start_speed: f64,
-    progress: f64,
     progress_step: f64,
-    gather: Gather,
+    /// Holds the command too.
     output: InertiaOutput,
+    gather: Gather,
 }
 
 impl Default for Inertia {
@@ -66,15 +70,14 @@ impl Default for Inertia {
             phase: Phase::Idle,
             fault: Fault::NONE,
             left: 0,
-            change: 0.0,
-            command: 0.0,
-            torque_bound: f64::MAX,
-            lag_limit: f64::MAX,
+            granted: 0,
+            quiet: 0,
+            limits: [f64::MAX; 2],
+            change: [0.0; 2],
             start_speed: 0.0,
-            progress: 0.0,
             progress_step: 0.0,
-            gather: Gather::default(),
             output: InertiaOutput::default(),
+            gather: Gather::default(),
         }
     }
 }
@@ -93,8 +96,8 @@ impl Inertia {
         self.fault = Fault::NONE;
         self.gather = Gather::new(plan.gate, plan.block, plan.cycle_s, plan.torque_nm);
         let cycles = if plan.listen { plan.listen_cycles } else { plan.gathering() };
-        self.progress = 0.0;
-        self.progress_step = 1.0 / f64::from(cycles.max(1));
+        self.progress_step = (1.0 - 1e-9) / f64::from(cycles.max(1)); // never above 1 by rounding
+        self.output.progress_ratio = 0.0;
         self.output.message = 0;
         self.enter(Phase::Begin);
         Ok(())
@@ -103,7 +106,7 @@ impl Inertia {
     /// Aborts a running measurement: back to the speed at start, then `GIB_ERR_ABORTED`. Nothing when not busy.
     pub fn abort(&mut self) {
         if self.busy() {
-            self.leave(Fault::of(GIB_ERR_ABORTED), self.command);
+            self.leave(Fault::of(GIB_ERR_ABORTED));
         }
     }
 
@@ -145,57 +148,93 @@ impl Inertia {
     /// One servo cycle.
     #[inline]
     pub fn step(&mut self, input: &InertiaInput) -> &InertiaOutput {
-        let (speed, torque) = (input.speed_rpm, input.torque);
-        let safe = input.flags == 0
-            && torque.abs() <= self.torque_bound
-            && (self.command - speed).abs() <= self.lag_limit
-            && self.left != 0;
-        if safe {
-            self.left -= 1;
-            self.gather.add(speed, torque);
-            self.command += self.change;
-            self.progress += self.progress_step;
-            self.output.speed_command_rpm = self.command;
-            self.output.progress_ratio = self.progress;
-        } else {
+        if !self.quick(input) {
             self.turn(input);
         }
         &self.output
     }
 
-    /// Every cycle that is not one like the last: resting, the end of a state, danger.
+    /// Does this cycle if it is one like the last, with the output in `output`; else returns false, and [`turn`](Self::turn)
+    /// must follow. The count is taken down in any case, which costs less than to look first; `turn` gives it back.
+    #[inline(always)]
+    pub fn quick(&mut self, input: &InertiaInput) -> bool {
+        self.quiet -= 1;
+        if self.quiet < 0 || input.flags != 0 {
+            return false;
+        }
+        let off = [self.output.speed_command_rpm - input.speed_rpm, 0.0 - input.torque].map(f64::abs);
+        let within = (off[0] <= self.limits[0]) & (off[1] <= self.limits[1]);
+        if !within || !self.gather.take(input.speed_rpm, input.torque) {
+            return false;
+        }
+        self.go_on();
+        true
+    }
+
+    #[inline(always)]
+    fn go_on(&mut self) {
+        let [command, progress] = self.change;
+        self.output.speed_command_rpm += command;
+        self.output.progress_ratio += progress;
+    }
+
+    /// A cycle that [`quick`](Self::quick) declined: resting, the end of a block or a state, danger.
     #[inline(never)]
-    fn turn(&mut self, input: &InertiaInput) {
+    pub fn turn(&mut self, input: &InertiaInput) {
         let speed = input.speed_rpm;
-        if !self.busy() {
-            if speed.is_finite() {
-                self.output.speed_command_rpm = speed;
+        self.quiet += 1;
+        self.settle();
+        match self.phase {
+            Phase::Idle | Phase::Done | Phase::Failed => {
+                if speed.is_finite() {
+                    self.output.speed_command_rpm = speed;
+                }
+                return;
             }
-            return;
+            Phase::Return => return self.go_on_returning(input),
+            Phase::Begin if speed.is_finite() => self.output.speed_command_rpm = speed,
+            _ => {}
         }
-        if self.phase == Phase::Begin && speed.is_finite() {
-            self.command = speed;
-        }
-        if self.phase == Phase::Return {
-            self.go_on_returning(input);
-        } else if let Some(fault) = self.danger(input) {
-            self.leave(fault, speed);
-        } else {
+        if let Some(fault) = self.danger(input) {
+            self.leave(fault);
+        } else if self.left == 0 || input.flags != 0 {
             self.next(speed);
+        } else {
+            self.left -= 1;
+            self.gather.add(speed, input.torque);
+            self.go_on();
         }
-        self.output.speed_command_rpm = self.command;
-        self.output.progress_ratio = self.progress.min(1.0);
+        self.grant();
+    }
+
+    /// Takes the quiet cycles that have passed off what is left of state and block.
+    #[inline(always)]
+    fn settle(&mut self) {
+        let passed = self.granted.abs_diff(self.quiet);
+        self.left = self.left.saturating_sub(passed);
+        self.gather.count(passed);
+        (self.granted, self.quiet) = (0, 0);
+    }
+
+    /// Grants the quiet cycles until state or block ends.
+    #[inline(always)]
+    fn grant(&mut self) {
+        let gathers = self.busy() && self.phase != Phase::Return;
+        let quiet = if gathers { self.left.min(self.gather.quiet()) } else { 0 };
+        self.granted = i32::try_from(quiet).unwrap_or(i32::MAX);
+        self.quiet = self.granted;
     }
 
     /// Anything in this cycle's input that must end a measurement.
     fn danger(&self, input: &InertiaInput) -> Option<Fault> {
         let fault = |code, field, value, low, high| Some(Fault { code, field, value, low, high });
-        let bound = self.torque_bound;
+        let [lag_limit, bound] = self.limits;
         let allowed = if self.phase == Phase::Listening { GIB_INERTIA_FINISH } else { 0 };
         match input.flags & !allowed {
             0 => {}
+            flags if flags & GIB_INPUT_FAULT != 0 => return Some(Fault::of(GIB_ERR_DRIVE_FAULT)),
             flags if flags & GIB_INPUT_ABORT != 0 => return Some(Fault::of(GIB_ERR_ABORTED)),
-            _ => return Some(Fault::of(GIB_ERR_DRIVE_FAULT)),
+            flags => return fault(GIB_ERR_CONFIG, "flags\0", f64::from(flags), 0.0, f64::from(allowed)),
         }
         for (field, value) in [("speed_rpm\0", input.speed_rpm), ("torque\0", input.torque)] {
             if !value.is_finite() {
@@ -205,10 +244,12 @@ impl Inertia {
         if input.torque.abs() > bound {
             return fault(GIB_ERR_TORQUE_BOUND, "torque\0", input.torque, -bound, bound);
         }
-        let lag = self.command - input.speed_rpm;
-        let owned = !matches!(self.phase, Phase::Begin | Phase::Listening);
-        if owned && lag.abs() > self.plan.lag_limit {
-            return fault(GIB_ERR_LAG, "speed_rpm\0", lag, -self.plan.lag_limit, self.plan.lag_limit);
+        if self.phase == Phase::Begin && !self.plan.listen && input.speed_rpm.abs() > FASTEST_START {
+            return fault(GIB_ERR_LAG, "speed_rpm\0", input.speed_rpm, -FASTEST_START, FASTEST_START);
+        }
+        let lag = self.output.speed_command_rpm - input.speed_rpm;
+        if lag.abs() > lag_limit {
+            return fault(GIB_ERR_LAG, "speed_rpm\0", lag, -lag_limit, lag_limit);
         }
         None
     }
@@ -231,36 +272,35 @@ impl Inertia {
         }
     }
 
-    /// The one door out: keeps the first fault and goes back to the speed at start, from the speed now.
+    /// The one door out: keeps the first fault and goes back to the speed at start, from the speed commanded now and no
+    /// faster than the ramps; with a faulted drive, or where gib commands nothing, it just ends.
     #[cold]
-    fn leave(&mut self, fault: Fault, speed: f64) {
-        if self.phase == Phase::Return {
-            return; // on the way out already
+    fn leave(&mut self, fault: Fault) {
+        if self.fault == Fault::NONE {
+            self.fault = fault;
+            self.output.message = fault.code;
         }
-        let owned = !matches!(self.phase, Phase::Begin | Phase::Listening);
-        self.fault = fault;
-        self.output.message = fault.code;
-        if owned && fault.code != GIB_ERR_DRIVE_FAULT {
-            if speed.is_finite() && fault.code == GIB_ERR_LAG {
-                self.command = speed; // what did not follow is not asked for at once again
-            }
-            self.enter(Phase::Return);
-        } else {
-            self.finish();
+        match self.phase {
+            Phase::Begin | Phase::Listening => self.finish(),
+            _ if fault.code == GIB_ERR_DRIVE_FAULT => self.finish(),
+            Phase::Return => {} // on the way already
+            _ => self.enter(Phase::Return),
         }
     }
 
-    /// Return goes on whatever is measured; only a faulted drive ends it at once.
+    /// Return goes on whatever is measured, but remembers a fault; only a faulted drive ends it at once.
     fn go_on_returning(&mut self, input: &InertiaInput) {
-        if self.left == 0 || input.flags & GIB_INPUT_FAULT != 0 {
-            if self.left > 0 && self.fault == Fault::NONE {
-                self.fault = Fault::of(GIB_ERR_DRIVE_FAULT);
-                self.output.message = GIB_ERR_DRIVE_FAULT;
-            }
+        if let Some(fault) = self.danger(input) {
+            self.leave(fault);
+        }
+        if self.phase != Phase::Return {
+            return;
+        }
+        if self.left == 0 {
             self.finish();
         } else {
             self.left -= 1;
-            self.command += self.change;
+            self.go_on();
         }
     }
 
@@ -270,30 +310,31 @@ impl Inertia {
 
     /// Goes to a state and sets its command, duration and limits.
     fn enter(&mut self, phase: Phase) {
+        self.settle();
         self.phase = phase;
-        let [low, high] = self.plan.speeds;
-        let plan = self.plan;
-        // Rounded up, so that no ramp is steeper than asked for.
-        let cycles_to = |goal: f64| ((goal - self.command).abs() / plan.acceleration).ceil().max(1.0) as u32;
+        let plan = &self.plan;
+        let ([low, high], command) = (plan.speeds, self.output.speed_command_rpm);
         let (goal, left) = match phase {
-            Phase::Idle | Phase::Begin | Phase::Done | Phase::Failed => (self.command, 0),
-            Phase::Approach => (low, cycles_to(low)),
+            Phase::Idle | Phase::Begin | Phase::Done | Phase::Failed => (command, 0),
+            Phase::Approach => (low, plan.cycles_between(low, command)),
             Phase::HoldLow(_) => (low, plan.hold),
-            Phase::Up(_) => (high, cycles_to(high)),
+            Phase::Up(_) => (high, plan.cycles_between(high, command)),
             Phase::HoldHigh(_) => (high, plan.hold),
-            Phase::Down(_) => (low, cycles_to(low)),
-            Phase::Listening => (self.command, plan.listen_cycles),
-            Phase::Return => (self.start_speed, cycles_to(self.start_speed)),
+            Phase::Down(_) => (low, plan.cycles_between(low, command)),
+            Phase::Listening => (command, plan.listen_cycles),
+            Phase::Return => (self.start_speed, plan.cycles_between(self.start_speed, command)),
         };
-        let moving = !matches!(phase, Phase::Listening) && left > 0;
-        self.change = if moving { (goal - self.command) / f64::from(left) } else { 0.0 };
-        self.left = left;
         // What is gathered on the way to the first ramp and back is not asked for.
         let gathers = !matches!(phase, Phase::Begin | Phase::Approach | Phase::Return);
         self.gather.leave_out(if gathers { plan.gate.takeup } else { u32::MAX });
-        // On the way back nothing is watched; a negative bound sends every cycle through `turn`.
-        self.torque_bound = if phase == Phase::Return { -1.0 } else { plan.torque_bound };
-        self.lag_limit = if phase == Phase::Listening { f64::MAX } else { plan.lag_limit };
+        let change = if left > 0 { (goal - command) / f64::from(left) } else { 0.0 };
+        self.change = [change, if gathers { self.progress_step } else { 0.0 }];
+        self.left = left;
+        let follows = !matches!(phase, Phase::Begin | Phase::Listening);
+        self.limits = [if follows { plan.lag_limit } else { f64::MAX }, plan.torque_bound];
+        if phase == Phase::Done {
+            self.output.progress_ratio = 1.0;
+        }
         self.output.status = match phase {
             Phase::Idle => GIB_OK,
             Phase::Done => GIB_DONE,

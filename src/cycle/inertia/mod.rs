@@ -13,6 +13,7 @@
 
 pub mod blocks;
 pub mod config;
+pub mod doubt;
 pub mod fit;
 pub mod io;
 pub mod machine;

@@ -128,10 +128,18 @@ impl Plan {
         self.lag_limit = in_range("lag_limit_rpm\0", or(c.lag_limit_rpm, 0.25 * top), 1e-3, 4e5)?;
         self.speeds = if high < 0.0 { [-low, -top] } else { [low, top] };
         self.acceleration = acceleration * cycle;
-        self.ramp = ((top - low) / self.acceleration + 0.5) as u32;
+        self.ramp = self.cycles_between(low, top);
         self.hold = (hold / cycle + 0.5) as u32;
         self.block = (self.ramp / BLOCKS_PER_RAMP).max(self.gathering() / PLANNED).max(4);
         Ok(())
+    }
+
+    /// Cycles of a ramp between two speeds, rpm; at least 1. Rounded up, so that none is steeper than asked for.
+    #[must_use]
+    pub fn cycles_between(&self, from: f64, to: f64) -> u32 {
+        // A whole number of cycles may come out a rounding error above itself.
+        const TRIFLE: f64 = 1e-6;
+        (((to - from).abs() / self.acceleration - TRIFLE).ceil() as u32).max(1)
     }
 
     /// Cycles in which ramps and holds are gathered.

@@ -57,6 +57,24 @@ fn amplitude_and_period_are_kept_over_a_hundred_periods() {
     }
 }
 
+/// A corner that is met exactly turns the slope, though the change of that cycle is still the old one.
+#[test]
+fn corners_met_exactly_turn_the_slope() {
+    let mut met = 0;
+    for amplitude_ratio in [0.125, 0.25, 0.3, 0.5] {
+        for period_s in [1.024, 2.0, 2.048, 4.0] {
+            let mut machine = started(&SpeedVariationConfig { period_s, amplitude_ratio, power_w: 1e5, ..config() });
+            let (low, high) = (1000.0 * (1.0 - amplitude_ratio), 1000.0 * (1.0 + amplitude_ratio));
+            for _ in 0..20_000 {
+                let speed = machine.step(&asked(1000.0)).speed_command_rpm;
+                assert!(speed >= low - 1e-6 && speed <= high + 1e-6, "{amplitude_ratio} {period_s}: {speed}");
+                met += u32::from((speed - high).abs() < 1e-9);
+            }
+        }
+    }
+    assert!(met > 50, "the corners were met {met} times");
+}
+
 /// The source's example: exactly the motor's power at the top, and the print's 1.88 times it.
 #[test]
 fn power_at_the_top_is_all_of_the_motor_and_no_more() {

@@ -66,6 +66,18 @@ impl Motor {
         most - self.used - self.viscous * speed
     }
 
+    /// Highest speed, rad/s, at which there is `torque` (N·m) and more left to accelerate with; 0 where there is none.
+    #[must_use]
+    pub fn fastest(&self, torque: f64) -> f64 {
+        // (level + B·ω)·ω = P and level + B·ω = T
+        let level = torque + self.used;
+        let root = level + (level * level + 4.0 * self.viscous * self.power).sqrt();
+        let by_power = if root > 0.0 { 2.0 * self.power / root } else { f64::MAX };
+        let spare = self.torque - level;
+        let by_torque = if self.viscous > 0.0 { spare / self.viscous } else { f64::MAX };
+        if spare >= 0.0 { by_power.min(by_torque) } else { 0.0 }
+    }
+
     /// Largest amplitude at a mean speed (rad/s, above 0) and a period (s, above 0), and what limits it.
     #[must_use]
     pub fn amplitude(&self, wave: Wave, mean: f64, period: f64) -> (f64, Limit) {
@@ -306,6 +318,10 @@ mod tests {
                 watts = watts.max(now * speed);
             }
             prop_assert!(torque <= motor.torque * (1.0 + 1e-6) && watts <= power * (1.0 + 1e-6), "{torque} {watts}");
+            let some = 0.3 * (motor.power / mean).min(motor.torque);
+            let fastest = motor.fastest(some);
+            prop_assert!(motor.left(fastest) >= some - 1e-9 * at_mean || fastest == 0.0);
+            prop_assert!(motor.left(fastest * 1.001 + 1e-9) < some, "it is the highest");
             let full = match limit {
                 Limit::Power => watts / power,
                 Limit::Torque => torque / motor.torque,

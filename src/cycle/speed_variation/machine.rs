@@ -2,15 +2,19 @@
 //!
 //! A triangle runs between its two corner speeds at a constant rate; a sine is a phasor turned a little in each cycle.
 //! Either way the change of speed in a cycle is bounded by what the motor has left at that speed, so that a change of
-//! amplitude, period, speed or load may ask for more but never gets it.
+//! amplitude, period, speed or load may ask for more but never gets it. Cycles in which none of that can matter are
+//! granted in advance and cost little ([`quick`]).
+
+mod quick;
 
 use super::config::SpeedVariationLimits;
 use super::io::*;
 use super::limit::{Motor, Wave};
 use super::plan::{Plan, code};
-use crate::cycle::backlash::io::GIB_INPUT_FAULT;
+use crate::cycle::backlash::io::{GIB_INPUT_ABORT, GIB_INPUT_FAULT};
 use crate::error::{
-    Fault, GIB_BUSY, GIB_DONE, GIB_ERR_ABORTED, GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE, GIB_ERR_STATE, GIB_OK,
+    Fault, GIB_BUSY, GIB_DONE, GIB_ERR_ABORTED, GIB_ERR_CONFIG, GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE,
+    GIB_ERR_SPEED_VARIATION_NONE, GIB_ERR_STATE, GIB_OK,
 };
 use crate::units::rpm_from_rad_s;
 use core::f64::consts::TAU;
@@ -24,13 +28,18 @@ enum Phase {
     Begin,
     /// The speed varies; ends with a stop, an abort or a fault.
     Running,
-    /// The speed goes back to its mean; ends when it is there.
+    /// The speed goes back to its mean; ends when it is there, or after twice the time that should take.
     Stopping,
     /// Ended as asked for; ends with a start.
     Done,
     /// Ended with an error; ends with a start.
     Failed,
 }
+
+/// Two values of an input, side by side: aligned, so that a processor compares both at once.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(16))]
+struct Pair([f64; 2]);
 
 /// A speed variation of one spindle: plain data, no pointers. Speeds in rad/s, positive in the sense of rotation.
 #[derive(Debug, Clone, Copy)]
@@ -39,26 +48,39 @@ pub struct SpeedVariation {
     phase: Phase,
     /// First fault of this run.
     fault: Fault,
-    /// Inputs that the constants below are for.
-    seen: SpeedVariationInput,
+    /// Values of the input that the constants below are for.
+    seen: [Pair; 2],
+    /// Change of speed on the way back, and the cycles left to get there.
+    back: f64,
+    patience: u32,
     speed: f64,
     mean: f64,
     /// Corner speeds and change in a cycle of a triangle.
     corners: [f64; 2],
     rate: f64,
     rising: bool,
-    /// Phasor of a sine, its turn in a cycle, its swing now, its goal and its change in a cycle.
+    /// Highest speeds at which the motor can rise and brake at that rate.
+    free: [f64; 2],
+    /// Phasor of a sine: cosine half a cycle ago and sine now; cosine and sine of half its turn in a cycle, and twice
+    /// that sine; its swing now, its goal and its change in a cycle.
     phasor: [f64; 2],
-    turn: [f64; 2],
+    half: [f64; 2],
+    turn: f64,
     swing: f64,
     swing_goal: f64,
     swing_rate: f64,
+    /// Cycles left that need only the quick look, and the change in one of them: of a triangle's speed, a sine's swing.
+    quiet: i32,
+    steady: f64,
     /// Motor that bounds the change in a cycle.
     motor: Motor,
     /// Friction that helps to brake, without cutting, which may end at any moment.
     brake_help: f64,
-    /// Cycle time over inertia.
+    /// Cycle time over inertia, and its inverse.
     per_nm: f64,
+    nm_per: f64,
+    /// The motor's power and torque, torque used and viscous friction, each as the change of speed in a cycle that it makes.
+    in_changes: [f64; 4],
     /// N·m per change of speed in a cycle, in the sense of rotation; rpm per rad/s likewise.
     to_torque: f64,
     to_rpm: f64,
@@ -71,20 +93,28 @@ impl Default for SpeedVariation {
             plan: Plan::REST,
             phase: Phase::Idle,
             fault: Fault::NONE,
-            seen: SpeedVariationInput::default(),
+            seen: [Pair::default(); 2],
+            back: 0.0,
+            patience: 0,
             speed: 0.0,
             mean: 0.0,
             corners: [0.0; 2],
             rate: 0.0,
             rising: true,
+            free: [0.0; 2],
             phasor: [1.0, 0.0],
-            turn: [1.0, 0.0],
+            half: [1.0, 0.0],
+            turn: 0.0,
             swing: 0.0,
             swing_goal: 0.0,
             swing_rate: 0.0,
+            quiet: 0,
+            steady: 0.0,
             motor: Plan::REST.motor,
             brake_help: 0.0,
             per_nm: 0.0,
+            nm_per: 0.0,
+            in_changes: [0.0; 4],
             to_torque: 0.0,
             to_rpm: rpm_from_rad_s(1.0),
             output: SpeedVariationOutput::default(),
@@ -107,6 +137,7 @@ impl SpeedVariation {
             speed: plan.mean,
             mean: plan.mean,
             per_nm: plan.cycle_s / plan.motor.inertia,
+            nm_per: plan.motor.inertia / plan.cycle_s,
             to_torque: plan.sense * plan.motor.inertia / plan.cycle_s,
             to_rpm: plan.sense * rpm_from_rad_s(1.0),
             output: SpeedVariationOutput { speed_command_rpm: self.output.speed_command_rpm, ..Default::default() },
@@ -152,28 +183,20 @@ impl SpeedVariation {
     /// One servo cycle.
     #[inline]
     pub fn step(&mut self, input: &SpeedVariationInput) -> &SpeedVariationOutput {
-        let seen = &self.seen;
-        let same = input.speed_rpm == seen.speed_rpm
-            && input.amplitude_ratio == seen.amplitude_ratio
-            && input.period_s == seen.period_s
-            && input.cutting_nm == seen.cutting_nm
-            && input.flags == 0
-            && self.phase == Phase::Running;
-        if !same {
+        if !self.quick(input) {
             self.turn(input);
-            return &self.output;
         }
-        self.advance();
         &self.output
     }
 
-    #[inline(always)]
+    #[inline]
     fn advance(&mut self) {
-        let wanted = match self.plan.wave {
-            Wave::Triangle => self.triangle(),
-            Wave::Sine => self.sine(),
+        let (before, wanted) = match self.plan.wave {
+            Wave::Triangle => (self.speed, self.triangle()),
+            Wave::Sine => (self.speed, self.sine()),
         };
         self.go(wanted);
+        self.grant(self.speed - before);
     }
 
     /// Goes by `wanted`, or as much of it as the motor has torque and power for at the speed that this leads to.
@@ -184,7 +207,7 @@ impl SpeedVariation {
         let left = self.motor.left(faster);
         let brake = left + self.brake_help;
         let up = if left > 0.0 { left * self.per_nm } else { 0.0 };
-        let down = -brake * self.per_nm;
+        let down = if brake > 0.0 { -brake * self.per_nm } else { 0.0 };
         let change = if wanted > up { up } else { wanted };
         let change = if change < down { down } else { change };
         self.speed += change;
@@ -215,60 +238,72 @@ impl SpeedVariation {
         }
     }
 
-    /// Change toward the sine of this cycle.
+    /// The phasor a cycle on. Its sine is exactly one, its cosine half a cycle late; the length of neither drifts.
     #[inline(always)]
+    fn turned(&self) -> [f64; 2] {
+        let [cos, sin] = self.phasor;
+        let cos = cos - self.turn * sin;
+        [cos, sin + self.turn * cos]
+    }
+
+    /// Turns by another angle (rad) a cycle from now on, from the same phase.
+    fn turn_by(&mut self, angle: f64) {
+        let ([cos, sin], [half_cos, half_sin]) = (self.phasor, self.half);
+        let cos = (cos - sin * half_sin) / half_cos;
+        let length = (cos * cos + sin * sin).sqrt();
+        let (cos, sin) = if length > 0.5 { (cos / length, sin / length) } else { (1.0, 0.0) };
+        self.half = [(0.5 * angle).cos(), (0.5 * angle).sin()];
+        self.turn = 2.0 * self.half[1];
+        self.phasor = [cos * self.half[0] + sin * self.half[1], sin];
+    }
+
+    /// Change toward the sine of this cycle.
     fn sine(&mut self) -> f64 {
-        let ([cos, sin], [turn_cos, turn_sin]) = (self.phasor, self.turn);
-        let (c, s) = (cos * turn_cos - sin * turn_sin, sin * turn_cos + cos * turn_sin);
-        // One Newton step keeps its length at 1.
-        let length = 1.5 - 0.5 * (c * c + s * s);
-        self.phasor = [c * length, s * length];
+        self.phasor = self.turned();
         let missing = self.swing_goal - self.swing;
         self.swing += if missing > self.swing_rate { self.swing_rate } else { missing };
         self.mean + self.swing * self.phasor[1] - self.speed
     }
 
-    /// Every cycle that is not one like the last: at rest, on the way back, something changed, something is wrong.
+    /// A cycle that `quick` declined: at rest, at a corner, on the way back, something changed or wrong.
     #[inline(never)]
-    fn turn(&mut self, input: &SpeedVariationInput) {
+    pub fn turn(&mut self, input: &SpeedVariationInput) {
+        self.quiet += 1;
         match self.phase {
+            Phase::Running if self.same(input) => self.advance(),
             Phase::Idle | Phase::Done | Phase::Failed => {
                 if input.speed_rpm.is_finite() {
                     self.output.speed_command_rpm = input.speed_rpm;
                 }
             }
-            Phase::Stopping if input.flags & GIB_INPUT_FAULT != 0 => self.leave(Fault::of(GIB_ERR_DRIVE_FAULT)),
-            Phase::Stopping => self.go_back(),
+            Phase::Stopping => {
+                if let Some(fault) = danger(input) {
+                    self.leave(fault);
+                }
+                if self.phase == Phase::Stopping {
+                    self.go_back();
+                }
+            }
             Phase::Begin | Phase::Running => {
                 let moving = self.phase == Phase::Running;
                 match self.change(input) {
-                    Ok(()) if input.flags & GIB_SPEED_VARIATION_STOP != 0 => self.enter(Phase::Stopping),
+                    Ok(()) if input.flags & GIB_SPEED_VARIATION_STOP != 0 => self.set_out(),
                     Ok(()) if moving => self.advance(),
                     Ok(()) => {}
                     Err(fault) => self.leave(fault),
                 }
-                self.seen = SpeedVariationInput { flags: 0, ..*input };
+                self.seen = pairs(input);
+                if self.phase == Phase::Stopping {
+                    self.go_back();
+                }
             }
         }
     }
 
     /// Takes over what this cycle's input wants, as far as the motor can.
     fn change(&mut self, input: &SpeedVariationInput) -> Result<(), Fault> {
-        let fields = [
-            ("speed_rpm\0", input.speed_rpm),
-            ("amplitude_ratio\0", input.amplitude_ratio),
-            ("period_s\0", input.period_s),
-            ("cutting_nm\0", input.cutting_nm),
-        ];
-        for (field, value) in fields {
-            if !value.is_finite() {
-                return Err(Fault { code: GIB_ERR_NON_FINITE, field, value, low: f64::MIN, high: f64::MAX });
-            }
-        }
-        match input.flags & !GIB_SPEED_VARIATION_STOP {
-            0 => {}
-            flags if flags & GIB_INPUT_FAULT != 0 => return Err(Fault::of(GIB_ERR_DRIVE_FAULT)),
-            _ => return Err(Fault::of(GIB_ERR_ABORTED)),
+        if let Some(fault) = danger(input) {
+            return Err(fault);
         }
         let plan = self.plan;
         let [mean, amplitude, period, cutting] =
@@ -285,8 +320,11 @@ impl SpeedVariation {
         self.motor = Motor { power: FOLLOWED * motor.power, torque: FOLLOWED * motor.torque, ..motor };
         if plan.published {
             // The print knows no limit at the top of the swing, and is shown without one.
-            (self.motor.power, self.motor.torque) = (f64::MAX, f64::MAX);
+            const ENDLESS: f64 = 1e30;
+            (self.motor.power, self.motor.torque) = (ENDLESS, ENDLESS);
         }
+        let Motor { power, torque, used, viscous, .. } = self.motor;
+        self.in_changes = [power, torque, used, viscous].map(|nm| nm * self.per_nm);
         self.brake_help = motor.used + plan.motor.used;
         if self.phase == Phase::Begin {
             self.speed = mean;
@@ -296,8 +334,8 @@ impl SpeedVariation {
         self.mean = mean;
         self.corners = [mean * (1.0 - granted), mean * (1.0 + granted)];
         self.rate = 4.0 * granted * mean * plan.cycle_s / period;
-        let angle = TAU * plan.cycle_s / period;
-        self.turn = [angle.cos(), angle.sin()];
+        self.free = [0.0, self.brake_help].map(|help| self.motor.fastest(self.rate * self.nm_per - help));
+        self.turn_by(TAU * plan.cycle_s / period);
         self.swing_goal = granted * mean;
         // Less is granted at once; the speed follows at the motor's own pace.
         self.swing = self.swing.min(self.swing_goal);
@@ -305,15 +343,29 @@ impl SpeedVariation {
         Ok(())
     }
 
-    /// One cycle back toward the mean, at the variation's own rate or faster where the motor can.
+    /// One cycle back toward the mean.
     fn go_back(&mut self) {
         let missing = self.mean - self.speed;
-        let most = self.rate.max(1e-6 * self.mean);
-        self.go(missing.max(-most).min(most));
-        if (self.mean - self.speed).abs() <= 1e-9 * self.mean {
+        self.go(missing.max(-self.back).min(self.back));
+        self.patience = self.patience.saturating_sub(1);
+        let there = (self.mean - self.speed).abs() <= 1e-9 * self.mean;
+        if !there && self.patience == 0 && self.fault == Fault::NONE {
+            self.fault = Fault::of(GIB_ERR_SPEED_VARIATION_NONE);
+            self.output.message = GIB_ERR_SPEED_VARIATION_NONE;
+        }
+        if there || self.patience == 0 {
             self.output.torque_nm = 0.0;
             self.enter(if self.fault == Fault::NONE { Phase::Done } else { Phase::Failed });
         }
+    }
+
+    /// Sets out for the mean, at the variation's own rate but not slower than a tenth of it in a second.
+    fn set_out(&mut self) {
+        const SLOWEST_1_S: f64 = 0.1;
+        self.back = self.rate.max(SLOWEST_1_S * self.mean * self.plan.cycle_s);
+        let cycles = 2.0 * (self.mean - self.speed).abs() / self.back + 1.0 / self.plan.cycle_s;
+        self.patience = cycles as u32;
+        self.enter(Phase::Stopping);
     }
 
     /// The one door out: keeps the first fault and goes back to the mean speed; with a faulted drive it just ends.
@@ -323,17 +375,19 @@ impl SpeedVariation {
             self.fault = fault;
             self.output.message = fault.code;
         }
-        let running = matches!(self.phase, Phase::Running | Phase::Stopping);
-        if running && fault.code != GIB_ERR_DRIVE_FAULT {
-            self.enter(Phase::Stopping);
-        } else {
-            self.output.torque_nm = 0.0;
-            self.enter(Phase::Failed);
+        match self.phase {
+            Phase::Running if fault.code != GIB_ERR_DRIVE_FAULT => self.set_out(),
+            Phase::Stopping if fault.code != GIB_ERR_DRIVE_FAULT => {} // on the way already
+            _ => {
+                self.output.torque_nm = 0.0;
+                self.enter(Phase::Failed);
+            }
         }
     }
 
     fn enter(&mut self, phase: Phase) {
         self.phase = phase;
+        self.quiet = 0;
         self.output.status = match phase {
             Phase::Idle => GIB_OK,
             Phase::Begin | Phase::Running | Phase::Stopping => GIB_BUSY,
@@ -348,4 +402,31 @@ impl SpeedVariation {
             Phase::Failed => GIB_SPEED_VARIATION_FAILED,
         };
     }
+}
+
+/// The values of an input, for comparison.
+#[inline(always)]
+fn pairs(input: &SpeedVariationInput) -> [Pair; 2] {
+    [Pair([input.speed_rpm, input.amplitude_ratio]), Pair([input.period_s, input.cutting_nm])]
+}
+
+/// Anything in this cycle's input that must end a variation.
+fn danger(input: &SpeedVariationInput) -> Option<Fault> {
+    match input.flags & !GIB_SPEED_VARIATION_STOP {
+        0 => {}
+        flags if flags & GIB_INPUT_FAULT != 0 => return Some(Fault::of(GIB_ERR_DRIVE_FAULT)),
+        flags if flags & GIB_INPUT_ABORT != 0 => return Some(Fault::of(GIB_ERR_ABORTED)),
+        flags => {
+            let (value, high) = (f64::from(flags), f64::from(GIB_SPEED_VARIATION_STOP));
+            return Some(Fault { code: GIB_ERR_CONFIG, field: "flags\0", value, low: 0.0, high });
+        }
+    }
+    let fields = [
+        ("speed_rpm\0", input.speed_rpm),
+        ("amplitude_ratio\0", input.amplitude_ratio),
+        ("period_s\0", input.period_s),
+        ("cutting_nm\0", input.cutting_nm),
+    ];
+    let (field, value) = fields.into_iter().find(|(_, value)| !value.is_finite())?;
+    Some(Fault { code: GIB_ERR_NON_FINITE, field, value, low: f64::MIN, high: f64::MAX })
 }

@@ -46,6 +46,8 @@ pub struct Plan {
 
 /// Shortest and longest period, s.
 const PERIODS: [f64; 2] = [0.02, 600.0];
+/// Smallest amplitude that counts as one.
+const LEAST: f64 = 1e-6;
 /// Largest amplitude: at 1 the spindle would stop.
 const MOST: f64 = 0.999;
 
@@ -111,7 +113,7 @@ impl Plan {
     /// As [`Plan::new`]; `GIB_ERR_SPEED_VARIATION_…` naming the amplitude, with the largest possible as upper bound.
     pub fn to_start(c: &SpeedVariationConfig) -> Result<Plan, Fault> {
         let plan = Plan { cycle_s: in_range("cycle_s\0", c.cycle_s, 5e-5, 0.02)?, ..Plan::new(c)? };
-        in_range("amplitude_ratio\0", plan.amplitude, 1e-6, MOST)?;
+        in_range("amplitude_ratio\0", plan.amplitude, LEAST, MOST)?;
         in_range("period_s\0", plan.period, PERIODS[0].max(8.0 * plan.cycle_s), PERIODS[1])?;
         let (possible, limit) = plan.possible(&plan.motor_cutting(plan.cutting), plan.mean, plan.period);
         if plan.amplitude > possible * (1.0 + 1e-9) {
@@ -179,11 +181,15 @@ impl Plan {
         let [low, high] = self.motor.speeds.map(rpm_from_rad_s);
         let speed = in_range("speed_rpm\0", speed_rpm * self.sense, low.max(1e-3), high)
             .map_err(|fault| Fault { code: GIB_ERR_SPEED_VARIATION_SPEED, ..fault })?;
-        let amplitude = in_range("amplitude_ratio\0", amplitude, 0.0, MOST)?;
+        // Less than the least is the least: on the way to nothing it must not become a number too small for a cycle.
+        let amplitude = match in_range("amplitude_ratio\0", amplitude, 0.0, MOST)? {
+            0.0 => self.amplitude,
+            amplitude => amplitude.max(LEAST),
+        };
         let period = if period == 0.0 { self.period } else { period };
         Ok([
             rad_s_from_rpm(speed),
-            if amplitude == 0.0 { self.amplitude } else { amplitude },
+            amplitude,
             in_range("period_s\0", period, PERIODS[0].max(8.0 * self.cycle_s), PERIODS[1])?,
             in_range("cutting_nm\0", cutting, 0.0, 1e6)?,
         ])

@@ -1,0 +1,107 @@
+//! Reasons not to believe a torque, whatever the fit says: a sensor that is stuck, dead or turned round for a part of the
+//! run can look like another inertia with another friction, with a small uncertainty.
+
+use super::blocks::Block;
+use super::fit::quantile;
+use super::robust::{Regression, Rows};
+use crate::error::{Fault, GIB_ERR_INERTIA_TORQUE};
+
+/// Why torque and motion do not belong together; `None` where they do.
+pub fn doubt(blocks: &[Block], rows: &Rows, found: &Regression, both_ways: bool) -> Option<Fault> {
+    stuck(blocks)
+        .or_else(|| if both_ways { dead(rows, found) } else { None })
+        .or_else(|| torn(found))
+        .or_else(|| halves(rows, found))
+}
+
+fn fault(field: &'static str, value: f64, high: f64) -> Fault {
+    Fault { code: GIB_ERR_INERTIA_TORQUE, field, value, low: 0.0, high }
+}
+
+/// The torque is, to the last bit, the same in blocks that follow one another, while the acceleration goes from a hold to a
+/// ramp or from one ramp to another: no torque sensor does that, and a coarse one that does can tell no inertia.
+pub fn stuck(blocks: &[Block]) -> Option<Fault> {
+    const TELLING: f64 = 0.6; // of the largest acceleration seen
+    const RUN: usize = 3;
+    let clear = TELLING * quantile(blocks, 0.98, |b| b.acceleration.abs());
+    let telling = |run: &&[Block]| {
+        let (least, most) =
+            run.iter().fold((f64::MAX, f64::MIN), |(low, high), b| (low.min(b.acceleration), high.max(b.acceleration)));
+        run.len() >= RUN && clear > 0.0 && most - least > clear
+    };
+    let run = blocks.chunk_by(|a, b| a.torque == b.torque).find(telling)?;
+    Some(fault("torque_stuck_blocks\0", run.len() as f64, (RUN - 1) as f64))
+}
+
+/// The torque is nothing but noise: neither inertia nor friction stands out of it.
+fn dead(rows: &Rows, found: &Regression) -> Option<Fault> {
+    const CLEAR: f64 = 4.0; // standard deviations
+    let counted = || rows.blocks.iter().filter(|b| rows.counts(b));
+    let sum: f64 = counted().map(|b| b.torque * b.speed.signum()).sum();
+    let noise = found.scatter * (counted().count() as f64).sqrt();
+    let inertia = found.terms[0].abs() / found.covariance[(0, 0)].max(f64::MIN_POSITIVE).sqrt();
+    let most = inertia.max(sum.abs() / noise.max(f64::MIN_POSITIVE));
+    (most < CLEAR).then(|| Fault { low: CLEAR, ..fault("torque_over_noise\0", most, f64::MAX) })
+}
+
+/// More of the motion contradicts the balance than outliers do, which come one by one and are rare.
+fn torn(found: &Regression) -> Option<Fault> {
+    const MOST: f64 = 0.15;
+    let share = found.dropped as f64 / (found.used + found.dropped).max(1) as f64;
+    (share > MOST).then(|| fault("blocks_dropped_ratio\0", share, MOST))
+}
+
+/// The first and the second half of the motion each say clearly what the other denies.
+fn halves(rows: &Rows, found: &Regression) -> Option<Fault> {
+    const CLEAR: f64 = 4.0; // standard deviations
+    const MOST: f64 = 0.1; // of the inertia: below, it is the ripple
+    let (first, second) = rows.blocks.split_at(rows.blocks.len() / 2);
+    let half = |blocks| Rows { blocks, ..*rows }.fit();
+    let (first, second) = (half(first)?, half(second)?);
+    let apart = (first.terms[0] - second.terms[0]).abs();
+    let chance = (first.covariance[(0, 0)] + second.covariance[(0, 0)]).max(0.0).sqrt();
+    let share = apart / found.terms[0].abs().max(f64::MIN_POSITIVE);
+    (share > MOST && apart > CLEAR * chance).then(|| fault("halves_apart_ratio\0", share, MOST))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fit::{Question, fit};
+    use super::*;
+    use crate::error::GIB_ERR_INERTIA_TORQUE;
+
+    /// Four ramps up and down with J 0.3, Tc 4 and some scatter; `torque` is what the sensor makes of it.
+    fn told(torque: impl Fn(usize, f64) -> f64) -> Result<f64, (i32, &'static str)> {
+        let block = |i: usize| {
+            let (acceleration, speed) = match i % 40 {
+                k @ 0..15 => (60.0, 30.0 + 4.0 * k as f64),
+                k @ 20..35 => (-60.0, 90.0 - 4.0 * (k - 20) as f64),
+                k => (0.0, if k < 20 { 90.0 } else { 30.0 }),
+            };
+            let truth = 0.3 * acceleration + 4.0 + 0.05 * (i as f64 * 2.7).sin();
+            Block { torque: torque(i, truth), speed, acceleration }
+        };
+        let blocks: Vec<Block> = (0..160).map(block).collect();
+        let question = Question { sample_s: 1e-3, target: 0.05, own: [0.0; 2], process_step: 0 };
+        let (balance, verdict) = fit(&blocks, 20, &question);
+        verdict.map(|()| balance.inertia.value).map_err(|fault| (fault.code, fault.field))
+    }
+
+    #[test]
+    fn a_torque_that_is_stuck_dead_or_turned_round_is_named() {
+        assert!((told(|_, truth| truth).unwrap() - 0.3).abs() < 1e-3);
+        let code = |torque: fn(usize, f64) -> f64| told(torque).unwrap_err().0;
+        assert_eq!(code(|_, _| 7.0), GIB_ERR_INERTIA_TORQUE, "stuck from the start");
+        assert_eq!(code(|i, truth| if i < 110 { truth } else { 7.0 }), GIB_ERR_INERTIA_TORQUE, "stuck on the way");
+        assert_eq!(code(|i, _| 0.05 * (i as f64 * 2.7).sin()), GIB_ERR_INERTIA_TORQUE, "dead");
+        assert_eq!(code(|i, truth| if i < 60 { truth } else { -truth }), GIB_ERR_INERTIA_TORQUE, "turned round");
+        assert_eq!(code(|i, truth| if i < 80 { truth } else { 2.0 * truth }), GIB_ERR_INERTIA_TORQUE, "changed");
+    }
+
+    /// Wild blocks that come one by one are no reason for doubt.
+    #[test]
+    fn outliers_are_not_doubted() {
+        let value = told(|i, truth| if i % 11 == 4 { -3.0 * truth - 20.0 } else { truth }).unwrap();
+        assert!((value - 0.3).abs() < 2e-3, "{value}");
+    }
+}
