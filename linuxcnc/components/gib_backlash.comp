@@ -13,6 +13,7 @@ LinuxCNC applies an amount at the next move of the joint: \\fBactive\\fR is true
 A parameter left at 0 takes the default of gib_backlash_config in gib.h.
 """;
 include "gib.h";
+include "gib_hal.h";
 
 pin in float position_cmd "from joint.N.motor-pos-cmd, mm";
 pin out float position_fb "to joint.N.motor-pos-fb, mm";
@@ -71,7 +72,6 @@ function _ fp "once per servo cycle, after motion-controller, before the drive";
 license "MIT OR Apache-2.0";
 author "the gib project";
 ;;
-#include <math.h>
 #include <string.h>
 
 /* LinuxCNC reads ini.N.backlash in its task cycle, 10 ms by default, and tells nobody: this long is safe. */
@@ -91,16 +91,6 @@ EXTRA_CLEANUP()
     for (__comp_inst = __comp_first_inst; __comp_inst; __comp_inst = __comp_inst->_next) {
         gib_backlash_free(gib);
     }
-}
-
-/* Takes a value over when it is a number; whether it is. */
-static int held(double value, double *safe)
-{
-    if (!isfinite(value)) {
-        return 0;
-    }
-    *safe = value;
-    return 1;
 }
 
 static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
@@ -163,7 +153,7 @@ FUNCTION(_)
     if (!enable) {
         fault = 0;
     }
-    fault = held(drive_fb, &drive_safe) && held(position_cmd, &cmd_safe) ? fault : GIB_ERR_NON_FINITE;
+    fault = gib_hal_held(drive_fb, &drive_safe) && gib_hal_held(position_cmd, &cmd_safe) ? fault : GIB_ERR_NON_FINITE;
     if (quiet(__comp_inst)) {
         show(__comp_inst);
         return;

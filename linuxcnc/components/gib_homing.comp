@@ -14,6 +14,7 @@ When homing fails, \\fBok\\fR falls and \\fBerror\\fR says why (see gib.h); both
 A parameter left at 0 takes the default of gib_homing_config in gib.h.
 """;
 include "gib.h";
+include "gib_hal.h";
 
 pin in float position_cmd "from joint.N.motor-pos-cmd, mm";
 pin out float position_fb "to joint.N.motor-pos-fb, mm";
@@ -59,7 +60,6 @@ function _ fp "once per servo cycle, after motion-controller, before the drive";
 license "MIT OR Apache-2.0";
 author "the gib project";
 ;;
-#include <math.h>
 #include <string.h>
 
 EXTRA_SETUP()
@@ -76,16 +76,6 @@ EXTRA_CLEANUP()
     for (__comp_inst = __comp_first_inst; __comp_inst; __comp_inst = __comp_inst->_next) {
         gib_homing_free(gib);
     }
-}
-
-/* Takes a value over when it is a number; whether it is. */
-static int held(double value, double *safe)
-{
-    if (!isfinite(value)) {
-        return 0;
-    }
-    *safe = value;
-    return 1;
 }
 
 static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
@@ -131,7 +121,7 @@ FUNCTION(_)
     if (!enable) {
         fault = 0;
     }
-    fault = held(drive_fb, &drive_safe) && held(position_cmd, &cmd_safe) ? fault : GIB_ERR_NON_FINITE;
+    fault = gib_hal_held(drive_fb, &drive_safe) && gib_hal_held(position_cmd, &cmd_safe) ? fault : GIB_ERR_NON_FINITE;
     if (quiet(__comp_inst)) {
         return;
     }

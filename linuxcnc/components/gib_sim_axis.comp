@@ -10,6 +10,8 @@ A plant to try gib on without a machine. Positions in mm of load travel, torques
 A body at rest stays there until the break-away torque is exceeded. At rest the table creeps until only part of the
 wind-up is held. Both ends of the table's way have an elastic dead stop.
 """;
+include "gib_sim.h";
+
 pin in float drive_cmd "commanded position, mm";
 pin in bit enable "power";
 pin in float torque_limit_cmd = 16 "torque limit, N m";
@@ -62,18 +64,6 @@ author "the gib project";
 #define KP 40.0
 #define KV 0.33
 #define TI 0.02
-
-/* About normal, by the sum of uniform numbers. */
-static double normal(unsigned *seed)
-{
-    double sum = -6.0;
-    int i;
-    for (i = 0; i < 12; i++) {
-        *seed = *seed * 1664525u + 1013904223u;
-        sum += (*seed >> 8) / 16777216.0;
-    }
-    return sum;
-}
 
 /* One body with Coulomb friction: sticks at rest, slides beyond break-away. Semi-implicit Euler. */
 static void move(double *place, double *v, int *sticks, double force, double sliding, double most, double inertia, double dt)
@@ -142,7 +132,7 @@ FUNCTION(_)
         integral += error * cycle / TI;
     }
     drive_fb = break_encoder ? NAN : fb;
-    motor_torque = t + noise * normal(&random);
+    motor_torque = t + noise * gib_sim_normal(&random);
     torque_limit_fb = torque_limit_cmd;
     table = y;
     for (i = 0; i < SUBSTEPS; i++) {

@@ -6,6 +6,8 @@ turns, the tool at x y z cuts as deep as it stands below it:
 
   load = idle + rise depth^0.8        torque = torque_per_mm depth
 """;
+include "gib_sim.h";
+
 pin in float x "true position of the tool, mm";
 pin in float y "the same";
 pin in float z "the same";
@@ -30,21 +32,10 @@ author "the gib project";
 ;;
 #include <math.h>
 
-static double normal(unsigned *seed)
-{
-    double sum = -6.0;
-    int i;
-    for (i = 0; i < 12; i++) {
-        *seed = *seed * 1664525u + 1013904223u;
-        sum += (*seed >> 8) / 16777216.0;
-    }
-    return sum;
-}
-
 FUNCTION(_)
 {
     double under = top + slope_x * x + slope_y * y - z;
     depth = fabs(speed) > 10.0 && under > 0.0 ? under : 0.0;
-    load = (fabs(speed) > 10.0 ? idle + rise * pow(depth, 0.8) : 0.0) + noise * normal(&random);
+    load = (fabs(speed) > 10.0 ? idle + rise * pow(depth, 0.8) : 0.0) + noise * gib_sim_normal(&random);
     torque = torque_per_mm * depth;
 }

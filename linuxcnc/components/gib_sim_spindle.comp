@@ -5,6 +5,8 @@ A plant to try gib on without a machine:
 
   J dw/dt = T - Tc sign(w) - B w - cutting      T from a PI speed servo, limited by torque and by power
 """;
+include "gib_sim.h";
+
 pin in float speed_cmd "commanded speed, rpm, signed";
 pin in float torque_ff "feed-forward, N m";
 pin in bit enable "power";
@@ -42,17 +44,6 @@ author "the gib project";
 #define CURRENT_S 0.001
 #define GRID_RAD (TURN / 65536.0)
 
-static double normal(unsigned *seed)
-{
-    double sum = -6.0;
-    int i;
-    for (i = 0; i < 12; i++) {
-        *seed = *seed * 1664525u + 1013904223u;
-        sum += (*seed >> 8) / 16777216.0;
-    }
-    return sum;
-}
-
 FUNCTION(_)
 {
     double cycle = period * 1e-9, dt = cycle / SUBSTEPS, limit, error, wanted, limited, before;
@@ -67,7 +58,7 @@ FUNCTION(_)
         integral += error * cycle * 0.25 * BANDWIDTH;
     }
     before = floor(turned / GRID_RAD);
-    motor_torque = t + noise * normal(&random);
+    motor_torque = t + noise * gib_sim_normal(&random);
     load = 100.0 * fabs(t) / rated_torque;
     for (i = 0; i < SUBSTEPS; i++) {
         double drag = coulomb + viscous * fabs(w) + cutting, next;

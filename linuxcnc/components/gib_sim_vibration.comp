@@ -8,6 +8,8 @@ A plant to try gib on without a machine. Seat and bearing swing at the first and
 
 The accelerometers read the second derivative, their offset, and noise.
 """;
+include "gib_sim.h";
+
 pin in float scale "position of the slide from its scale, mm";
 pin in float revs "revolutions of the spindle";
 pin in float speed "of the spindle, rpm";
@@ -31,24 +33,13 @@ author "the gib project";
 
 #define TURN 6.283185307179586
 
-static double normal(unsigned *seed)
-{
-    double sum = -6.0;
-    int i;
-    for (i = 0; i < 12; i++) {
-        *seed = *seed * 1664525u + 1013904223u;
-        sum += (*seed >> 8) / 16777216.0;
-    }
-    return sum;
-}
-
 FUNCTION(_)
 {
     double at = TURN * (revs - floor(revs)), w = TURN * speed / 60.0, share = fmin(1.0, fabs(speed) / 600.0);
     double one = share * seat_um, other = share * bearing_um;
     double of_seat = one * (sin(at) + 0.3 * sin(3.0 * at + 1.0));
     double of_bearing = other * (sin(at + phase) + 0.3 * sin(3.0 * at + 2.0));
-    seat = -1e-6 * w * w * one * (sin(at) + 2.7 * sin(3.0 * at + 1.0)) + offset + noise * normal(&random);
-    bearing = -1e-6 * w * w * other * (sin(at + phase) + 2.7 * sin(3.0 * at + 2.0)) - offset + noise * normal(&random);
+    seat = -1e-6 * w * w * one * (sin(at) + 2.7 * sin(3.0 * at + 1.0)) + offset + noise * gib_sim_normal(&random);
+    bearing = -1e-6 * w * w * other * (sin(at + phase) + 2.7 * sin(3.0 * at + 2.0)) - offset + noise * gib_sim_normal(&random);
     position = scale + 1e-3 * (of_seat - of_bearing);
 }

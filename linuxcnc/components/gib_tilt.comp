@@ -12,6 +12,7 @@ The table of loads, \\fBdepth-NN\\fR and \\fBload-NN\\fR, holds for one tool, ma
 A parameter left at 0 takes the default of gib_tilt_config in gib.h.
 """;
 include "gib.h";
+include "gib_hal.h";
 
 pin in float x "commanded position from joint.0.pos-cmd, mm";
 pin in float y "commanded position from joint.1.pos-cmd, mm";
@@ -65,7 +66,6 @@ function _ fp "once per servo cycle, after motion-controller, before gib_backlas
 license "MIT OR Apache-2.0";
 author "the gib project";
 ;;
-#include <math.h>
 #include <string.h>
 
 EXTRA_SETUP()
@@ -125,13 +125,8 @@ FUNCTION(_)
     if (!enable) {
         fault = 0;
     }
-    if (!isfinite(position_cmd) || !isfinite(drive_fb)) {
-        /* What is no number goes nowhere: the last safe value stays, and motion is told. */
-        fault = GIB_ERR_NON_FINITE;
-    } else {
-        cmd_safe = position_cmd;
-        fb_safe = drive_fb;
-    }
+    /* What is no number goes nowhere: the last safe value stays, and motion is told. */
+    fault = gib_hal_held(position_cmd, &cmd_safe) && gib_hal_held(drive_fb, &fb_safe) ? fault : GIB_ERR_NON_FINITE;
     if (start && !started && enable && !busy && !fault) {
         error = begin(__comp_inst, period * 1e-9);
         busy = error == GIB_OK;

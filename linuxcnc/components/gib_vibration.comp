@@ -9,6 +9,7 @@ The correction comes in while \\fBon\\fR is true and the spindle turns; \\fBblen
 A parameter left at 0 takes the default of gib_vibration_config in gib.h.
 """;
 include "gib.h";
+include "gib_hal.h";
 
 pin in float scale "position of the slide from its scale, mm";
 pin in float angle "spindle angle, degrees";
@@ -39,7 +40,6 @@ function _ fp "once per servo cycle, after what reads scale and accelerometers";
 license "MIT OR Apache-2.0";
 author "the gib project";
 ;;
-#include <math.h>
 
 EXTRA_SETUP()
 {
@@ -69,10 +69,7 @@ static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
 
 FUNCTION(_)
 {
-    int good = isfinite(scale);
-    if (good) {
-        safe = scale;
-    }
+    int good = gib_hal_held(scale, &safe);
     if (on && !asked && !running) {
         error = begin(__comp_inst, period * 1e-9);
         running = error == GIB_OK;
