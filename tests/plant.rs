@@ -113,7 +113,8 @@ fn an_axis_within_its_friction_stands_still_to_the_last_bit() {
 
 #[test]
 fn a_clearance_is_crossed_without_torque_on_the_table() {
-    let backlash = Effect::Backlash { width_um: 50.0, table_inertia_share: 0.5, table_friction_share: 0.5 };
+    let backlash =
+        Effect::Backlash { width_um: 50.0, table_inertia_share: 0.5, table_friction_share: 0.5, contact_hz: 400.0 };
     let trace = run(&rig(&[backlash]), "reversals", &Setup::default());
     // In steady slow motion one way and the other, motor − table differs by clearance + 2·Ts/k.
     let masses = rig(&[backlash]).two_masses().unwrap().unwrap();
@@ -133,7 +134,7 @@ fn a_clearance_is_crossed_without_torque_on_the_table() {
 #[test]
 fn the_plant_converges_with_its_step() {
     let effects = [
-        Effect::Backlash { width_um: 20.0, table_inertia_share: 0.4, table_friction_share: 0.6 },
+        Effect::Backlash { width_um: 20.0, table_inertia_share: 0.4, table_friction_share: 0.6, contact_hz: 400.0 },
         Effect::PreslidingFriction { displacement_um: 8.0 },
         Effect::StribeckFriction { torque: 0.3, velocity_mm_s: 4.0 },
     ];
@@ -233,7 +234,12 @@ fn every_cause_of_torque_is_predicted() {
 #[test]
 fn a_clearance_is_predicted_with_and_without_a_scale() {
     let clean = residual(&rig(&[]), &rig(&[]), 11);
-    let truth = rig(&[Effect::Backlash { width_um: 60.0, table_inertia_share: 0.4, table_friction_share: 0.6 }]);
+    let truth = rig(&[Effect::Backlash {
+        width_um: 60.0,
+        table_inertia_share: 0.4,
+        table_friction_share: 0.6,
+        contact_hz: 400.0,
+    }]);
     let rigid = residual(&rig(&[]), &truth, 11);
     let (encoder, scale) = (residual(&truth, &truth, 11), residual_of(&truth, &truth, 11, true));
     println!("clearance: clean {clean:.4}, rigid {rigid:.4}, encoder alone {encoder:.4}, with scale {scale:.4}");

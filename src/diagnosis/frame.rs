@@ -10,8 +10,10 @@
 use super::filter::{LowPass, SIMPSON, convolve, norm, simpson};
 use super::fit::dot;
 use crate::machine::{Axis, Belief, Effect};
+use crate::plant::motion::Motion;
 use crate::plant::predict::sampling_shift_s;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// Plain columns of one axis: what a diagnosis needs of a recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,6 +80,7 @@ pub struct Frame<'a> {
     pub speed: Vec<f64>,
     /// Filtered torque of every row, not aligned.
     torque: Vec<f64>,
+    motion: OnceLock<Option<Motion>>,
     /// Weights of the whole filter of the torque balance, and of that of table − encoder; odd.
     kernel: Vec<f64>,
     table_kernel: Vec<f64>,
@@ -139,9 +142,18 @@ impl<'a> Frame<'a> {
             acceleration,
             speed,
             torque,
+            motion: OnceLock::new(),
             kernel,
             table_kernel,
         }
+    }
+
+    /// The motion as a prediction sees it, up to where it meets the encoder's noise: sharper than [`Frame::x`], for what
+    /// happens between two rows. `None` where no stretch is long enough.
+    #[must_use]
+    pub fn motion(&self) -> Option<&Motion> {
+        let of = || Motion::of_stretches(&self.columns.time_s, &self.columns.position, &self.columns.stretches);
+        self.motion.get_or_init(of).as_ref()
     }
 
     /// A regressor of every row, filtered like the torque, at the judged rows.

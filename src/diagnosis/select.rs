@@ -17,6 +17,8 @@ const BEAM: usize = 2;
 const TRIED: usize = 6;
 /// Most causes in a set.
 const MOST: usize = 6;
+/// Starts of a law that are laid out in one go; springs are stepped as many side by side.
+const AT_A_TIME: usize = 8;
 /// Least gain of a cause in Σ ln(mean square): 8 % of what is left. A smaller one would not be worth a machinist's time,
 /// and imperfect filters, grids and reversals make up to half of it on machines without any fault.
 pub const LEAST_GAIN: f64 = 0.08;
@@ -49,11 +51,20 @@ struct Search<'s, 'f, 'a> {
 /// [`Stopped`] when the watch's caller said so.
 pub fn select(bench: &Bench, laws: &[&'static Law], watch: &Watch) -> Result<Selection, Stopped> {
     let empty = bench.fit(Vec::new());
-    let shelf = watch.each(laws, (0.05, 0.15), "laying out what each cause would do", |law| {
-        let parts = if law.starts_from_rest { Vec::new() } else { bench.parts(law, bench.starts(law, &empty)) };
-        (law.cause, parts)
+    // Few starts at a time, so that all cores have work on the laws that take long.
+    let starts: Vec<(&'static Law, Vec<Vec<f64>>)> = laws
+        .iter()
+        .filter(|law| !law.starts_from_rest)
+        .flat_map(|&law| bench.starts(law, &empty).chunks(AT_A_TIME).map(|c| (law, c.to_vec())).collect::<Vec<_>>())
+        .collect();
+    let laid = watch.each(&starts, (0.05, 0.15), "laying out what each cause would do", |(law, shapes)| {
+        (law.cause, bench.parts(law, shapes.clone()))
     })?;
-    let search = Search { bench, laws, shelf: shelf.into_iter().collect(), watch };
+    let mut shelf = Shelf::new();
+    for (cause, parts) in laid {
+        shelf.entry(cause).or_default().extend(parts);
+    }
+    let search = Search { bench, laws, shelf, watch };
     let mut beam = vec![empty];
     let mut best: Vec<Fit> = beam.clone();
     let mut rivals = Vec::new();

@@ -148,6 +148,8 @@ vocabulary! {
         table_inertia_share: "table_inertia_share", "table_inertia_share", "", 0.01, 0.99, = 0.5;
         /// Share of Coulomb, viscous and the other friction that is on the table's side.
         table_friction_share: "table_friction_share", "table_friction_share", "", 0.0, 1.0, = 0.5;
+        /// How stiff the flanks meet: the frequency of motor against table while they touch, Hz; drive_compliance overrules it.
+        contact_hz: "contact_hz", "contact_hz", "", 1.0, 1e5, = 700.0;
     }
     /// Elastic drive. The frequency is that of the two free masses, √(k·(1/J₁+1/J₂))/2π, the table the lighter one.
     DriveCompliance "drive_compliance" once "elastic drive: resonance between motor and table" {

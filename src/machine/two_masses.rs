@@ -7,9 +7,7 @@
 use super::{Axis, Effect};
 use std::f64::consts::TAU;
 
-/// Resonance of the contact that ends a dead zone where no elasticity is known: stiff against any position loop.
-const CONTACT_HZ: f64 = 400.0;
-/// Damping ratio of that contact.
+/// Damping ratio of the flanks' contact.
 const CONTACT_DAMPING: f64 = 0.3;
 
 /// An axis as motor and table, everything in the motor's coordinate and the drive's own unit.
@@ -40,8 +38,9 @@ impl Axis {
         let mut compliance = None;
         for effect in &self.effects {
             match *effect {
-                Effect::Backlash { width_um, table_inertia_share, table_friction_share } => {
-                    backlash = Some((width_um * self.drive.motor_per_um(), table_inertia_share, table_friction_share));
+                Effect::Backlash { width_um, table_inertia_share, table_friction_share, contact_hz } => {
+                    let clearance = width_um * self.drive.motor_per_um();
+                    backlash = Some((clearance, table_inertia_share, table_friction_share, TAU * contact_hz));
                 }
                 Effect::DriveCompliance { resonance_hz, stiffness_n_um, table_friction_share, damping_ratio } => {
                     compliance = Some((TAU * resonance_hz, stiffness_n_um, table_friction_share, damping_ratio));
@@ -49,7 +48,7 @@ impl Axis {
                 _ => {}
             }
         }
-        let clearance = backlash.map_or(0.0, |(clearance, _, _)| clearance);
+        let clearance = backlash.map_or(0.0, |(clearance, _, _, _)| clearance);
         if let Some((omega, stiffness_n_um, table_friction_share, damping_ratio)) = compliance {
             let stiffness = self.drive.motor_stiffness(stiffness_n_um);
             let root = 1.0 - 4.0 * stiffness / (inertia * omega * omega);
@@ -74,10 +73,9 @@ impl Axis {
                 table_friction_share,
             }));
         }
-        Ok(backlash.map(|(_, inertia_share, table_friction_share)| {
+        Ok(backlash.map(|(_, inertia_share, table_friction_share, omega)| {
             let table_inertia = inertia_share * inertia;
             let motor_inertia = inertia - table_inertia;
-            let omega = TAU * CONTACT_HZ;
             let stiffness = omega * omega * motor_inertia * table_inertia / inertia;
             let damping = 2.0 * CONTACT_DAMPING * stiffness / omega;
             TwoMasses { motor_inertia, table_inertia, stiffness, damping, clearance, table_friction_share }

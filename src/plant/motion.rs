@@ -8,6 +8,7 @@
 
 use realfft::RealFftPlanner;
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 /// Motion of one axis at the rows of its recording, in load units (mm; degree for rotary).
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +34,31 @@ impl Motion {
     #[must_use]
     pub fn estimate(time_s: &[f64], position: &[f64]) -> Option<Motion> {
         Self::with_cutoff(time_s, position, None)
+    }
+
+    /// Motion of stretches of rows, all with the cut-off of the longest; NaN in rows outside them. `None` where the longest is
+    /// too short; shorter ones stay NaN.
+    #[must_use]
+    pub fn of_stretches(time_s: &[f64], position: &[f64], stretches: &[Range<usize>]) -> Option<Motion> {
+        let longest = stretches.iter().max_by_key(|s| s.len()).filter(|s| s.len() >= FEWEST_ROWS)?.clone();
+        let period_s = (time_s[longest.end - 1] - time_s[longest.start]) / (longest.len() - 1) as f64;
+        let cutoff_hz = noise_crossing_hz(&position[longest], period_s);
+        let nothing = || vec![f64::NAN; position.len()];
+        let mut motion =
+            Motion { position: nothing(), velocity: nothing(), acceleration: nothing(), cutoff_hz, resolution: 0.0 };
+        let (mut square, mut rows) = (0.0, 0);
+        for s in stretches {
+            let Some(part) = Self::with_cutoff(&time_s[s.clone()], &position[s.clone()], Some(cutoff_hz)) else {
+                continue;
+            };
+            motion.position[s.clone()].copy_from_slice(&part.position);
+            motion.velocity[s.clone()].copy_from_slice(&part.velocity);
+            motion.acceleration[s.clone()].copy_from_slice(&part.acceleration);
+            square += part.resolution * part.resolution * s.len() as f64;
+            rows += s.len();
+        }
+        motion.resolution = (square / rows.max(1) as f64).sqrt();
+        Some(motion)
     }
 
     /// The same with a given cut-off, for instance that of the whole recording for one short stretch of it.

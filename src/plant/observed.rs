@@ -1,6 +1,6 @@
 //! One axis of a recording in the units of the model, with its motion worked out once.
 
-use super::motion::{FEWEST_ROWS, Motion, noise_crossing_hz};
+use super::motion::{FEWEST_ROWS, Motion};
 use crate::machine::Axis;
 use crate::recording::{Recording, RecordingError, Signal, Unit};
 use std::ops::Range;
@@ -78,19 +78,7 @@ impl Observed {
         runs.retain(|run| run.len() >= FEWEST_ROWS && run.end <= position.len());
         let longest = runs.iter().max_by_key(|run| run.len())?.clone();
         let period_s = (time_s[longest.end - 1] - time_s[longest.start]) / (longest.len() - 1) as f64;
-        let cutoff_hz = noise_crossing_hz(&position[longest], period_s);
-        let nothing = || vec![f64::NAN; position.len()];
-        let mut motion =
-            Motion { position: nothing(), velocity: nothing(), acceleration: nothing(), cutoff_hz, resolution: 0.0 };
-        let mut square = 0.0;
-        for run in &runs {
-            let part = Motion::with_cutoff(&time_s[run.clone()], &position[run.clone()], Some(cutoff_hz))?;
-            motion.position[run.clone()].copy_from_slice(&part.position);
-            motion.velocity[run.clone()].copy_from_slice(&part.velocity);
-            motion.acceleration[run.clone()].copy_from_slice(&part.acceleration);
-            square += part.resolution * part.resolution * run.len() as f64;
-        }
-        motion.resolution = (square / runs.iter().map(Range::len).sum::<usize>() as f64).sqrt();
+        let motion = Motion::of_stretches(&time_s, &position, &runs)?;
         Some(Observed { time_s, period_s, position, torque, command, table_position, runs, motion })
     }
 }

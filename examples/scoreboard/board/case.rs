@@ -20,8 +20,10 @@ pub const STEP: f64 = 1e-5;
 const SIZING_STEP: f64 = 2.5e-5;
 /// The least size that is asked for.
 pub const LEAST: f64 = 1.3;
-/// The most: beyond it nobody needs a diagnosis to see that something is wrong.
+/// The most: beyond it nobody needs a diagnosis to see that something is wrong. A clearance is as wide as it is: its flanks
+/// meet as hard in a narrow one.
 const MOST: f64 = 40.0;
+const MOST_OF_CLEARANCE: f64 = 400.0;
 
 /// What to hide.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -156,7 +158,8 @@ impl Bench {
             self.rig.torque_noise = wanted.clamp(0.008 * self.rig.coulomb, 0.08 * self.rig.coulomb);
             size = self.size(effect)?;
         }
-        for _ in 0..4 {
+        let most = if effect.cause == "backlash" { MOST_OF_CLEARANCE } else { MOST };
+        for _ in 0..if effect.cause == "backlash" { 0 } else { 4 } {
             if (size / target - 1.0).abs() < 0.1 || size <= 0.0 {
                 break;
             }
@@ -167,7 +170,7 @@ impl Bench {
             effect.amount = amount;
             size = self.size(effect)?;
         }
-        (LEAST..=MOST).contains(&size).then_some(size)
+        (LEAST..=most).contains(&size).then_some(size)
     }
 }
 

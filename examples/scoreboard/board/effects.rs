@@ -105,7 +105,7 @@ impl Effect {
             }
             "backlash" => {
                 form = [r.uniform(0.3, 0.6), r.uniform(0.5, 0.9), 0.0];
-                (3e-3, 0.15, 0.5)
+                (3e-3, 0.06, 0.5)
             }
             "drive_compliance" => {
                 form = [r.uniform(0.2, 0.5), r.uniform(0.5, 0.9), r.uniform(0.01, 0.08)];
