@@ -18,7 +18,7 @@ RELEASE := $(TARGET)/$(PROFILE)
 # What a C program outside the tree would find installed: the libraries with their links.
 LIB := build/lib
 
-.PHONY: all build header demo test deps check-format check-lints test-rust test-harness linuxcnc-test bench install uninstall clean help
+.PHONY: all build header demo test deps check-format check-lints test-rust test-harness linuxcnc-test bench scoreboard install uninstall clean help
 
 all: build
 
@@ -69,6 +69,11 @@ linuxcnc-test: build ## a simulated mill in the real control, headless; skipped 
 
 bench: build ## instructions per step, printed
 	@if [ -e c-harness/Makefile ]; then $(MAKE) -C c-harness bench; else echo "bench: skipped, no c-harness/Makefile"; fi
+
+# 64 cases take some five minutes on two busy cores; CASES= and SEED= (the clock where left out) for others.
+scoreboard: build ## hide effects in random machines and score what gib diagnose says
+	$(CARGO) build --profile $(PROFILE) --example scoreboard
+	$(RELEASE)/examples/scoreboard --gib $(RELEASE)/gib --longest 40 --cases $(or $(CASES),64) $(if $(SEED),--seed $(SEED))
 
 install: build ## into $(DESTDIR)$(PREFIX)
 	$(INSTALL) -d $(addprefix $(DESTDIR),$(INCLUDEDIR) $(LIBDIR)/pkgconfig $(BINDIR) $(DOCDIR))
