@@ -490,6 +490,31 @@
 #define GIB_ERR_DIAGNOSIS_HOLDOUT (-1201)
 
 /**
+ * The deviation grew; the best correction is in force again.
+ */
+#define GIB_ERR_LEARNING_GROWS (-800)
+
+/**
+ * The tolerance was not reached within the updates allowed; the best correction is in force.
+ */
+#define GIB_ERR_LEARNING_UPDATES (-801)
+
+/**
+ * The deviation of a cycle was beyond its bound; the correction was taken out.
+ */
+#define GIB_ERR_LEARNING_DEVIATION (-802)
+
+/**
+ * The spindle's angle is no number or jumps; learning waits.
+ */
+#define GIB_ERR_LEARNING_ANGLE (-803)
+
+/**
+ * The detected position is no number; learning waits.
+ */
+#define GIB_ERR_LEARNING_DETECTED (-804)
+
+/**
  * Slow-feed mode (default): the motor is fed slowly and the torque read in every cycle. The more accurate one.
  */
 #define GIB_BACKLASH_SLOW_FEED 0
@@ -878,6 +903,97 @@
  * Input flag: listening has lasted long enough; evaluate what was gathered.
  */
 #define GIB_INERTIA_FINISH 4
+
+/**
+ * Harmonics of the deviation, each by the machine's measured answer (default).
+ */
+#define GIB_LEARNING_FILTERED 0
+
+/**
+ * The deviation itself, point by point with a phase lead, as published.
+ */
+#define GIB_LEARNING_PUBLISHED 1
+
+/**
+ * Most points of a revolution.
+ */
+#define GIB_LEARNING_POINTS 1024
+
+/**
+ * Most harmonics that are learnt.
+ */
+#define GIB_LEARNING_HARMONICS 16
+
+/**
+ * Not started: the command is the target.
+ */
+#define GIB_LEARNING_IDLE 0
+
+/**
+ * The spindle does not turn, or no position is detected; the correction is out or on its way.
+ */
+#define GIB_LEARNING_WAITING 1
+
+/**
+ * The machine settles after a change.
+ */
+#define GIB_LEARNING_SETTLE 2
+
+/**
+ * The deviation is measured over whole revolutions.
+ */
+#define GIB_LEARNING_MEASURE 3
+
+/**
+ * The next correction is computed, a point or a harmonic a cycle.
+ */
+#define GIB_LEARNING_EVALUATE 4
+
+/**
+ * The new correction replaces the old one, over a revolution.
+ */
+#define GIB_LEARNING_BLEND 5
+
+/**
+ * Within the tolerance; the correction stays in force.
+ */
+#define GIB_LEARNING_DONE 6
+
+/**
+ * The correction fades out, to end with an error.
+ */
+#define GIB_LEARNING_STOPPING 7
+
+/**
+ * Ended with an error, kept until the next start. The best correction stays in force after `GIB_ERR_LEARNING_GROWS` and
+ * `GIB_ERR_LEARNING_UPDATES`, none after any other.
+ */
+#define GIB_LEARNING_FAILED 8
+
+/**
+ * Reason: the spindle does not turn, or too slowly.
+ */
+#define GIB_LEARNING_NO_ROTATION 1
+
+/**
+ * Reason: the spindle's angle is no number or jumps.
+ */
+#define GIB_LEARNING_BAD_ANGLE 2
+
+/**
+ * Reason: the detected position is no number.
+ */
+#define GIB_LEARNING_NOT_DETECTED 4
+
+/**
+ * Reason: the speed changed by more than its tolerance; what was measured is not compared.
+ */
+#define GIB_LEARNING_SPEED_CHANGED 8
+
+/**
+ * Reason: the correction is at its bound.
+ */
+#define GIB_LEARNING_LIMITED 16
 
 /**
  * The speed rises and falls at a constant rate (default).
@@ -1277,6 +1393,11 @@ typedef struct gib_homing gib_homing;
  * An inertia measurement of one spindle. Opaque; its size is `gib_inertia_size()`.
  */
 typedef struct gib_inertia gib_inertia;
+
+/**
+ * The learnt command of one axis. Opaque; its size is `gib_learning_size()`.
+ */
+typedef struct gib_learning gib_learning;
 
 /**
  * A machine file in memory. Opaque; it owns memory of its own, so that it comes from `gib_machine_new` alone.
@@ -2924,7 +3045,7 @@ typedef struct gib_vibration_config {
      */
     double frequency_min_hz;
     /**
-     * Revolutions over which the harmonics are averaged, 1 to 1000 (default 8).
+     * Revolutions over which the harmonics are averaged while the speed is steady, 1 to 1000 (default 16).
      */
     double averaging_revolutions;
     /**
@@ -3502,6 +3623,225 @@ typedef struct gib_tilt_two_point_result {
 } gib_tilt_two_point_result;
 
 /**
+ * How to learn. Zero in a field means its default; fields marked "required" have none.
+ */
+typedef struct gib_learning_config {
+    /**
+     * Size of this struct as the caller knows it: `sizeof(gib_learning_config)`. Required.
+     */
+    uint32_t struct_size;
+    /**
+     * `GIB_LEARNING_FILTERED` (default) or `GIB_LEARNING_PUBLISHED`.
+     */
+    int32_t method;
+    /**
+     * Points of a revolution, an even number from 16 to 1024 (default 256), at least four a harmonic. For the published method no more than a
+     * revolution has cycles: a point that no cycle met takes the deviation of the one before it.
+     */
+    int32_t points;
+    /**
+     * Harmonics of a revolution that are learnt, 1 to 16 (default 8); only for `GIB_LEARNING_FILTERED`.
+     */
+    int32_t harmonics;
+    /**
+     * Revolutions over which the deviation is averaged, 1 to 64 (default 2).
+     */
+    int32_t revolutions;
+    /**
+     * Revolutions that the machine is given to settle after a change, 1 to 64 (default 2).
+     */
+    int32_t settle_revolutions;
+    /**
+     * Updates at most, 1 to 10000 (default 100).
+     */
+    int32_t updates;
+    /**
+     * 1: begin from the correction that this instance holds, learnt before or loaded. 0 (default): from none.
+     */
+    int32_t resume;
+    /**
+     * Servo period, 0.00005 to 0.02 s. Required.
+     */
+    double cycle_s;
+    /**
+     * Phase lead Δθ at the present speed, 0 to 90 degrees (default 0).
+     */
+    double lead_deg;
+    /**
+     * Lag of the servo, for a lead that grows with speed, 0 to 0.1 s (default 0). Both leads add.
+     */
+    double lag_s;
+    /**
+     * Share γ of what is wrong that an update takes away, 0.05 to 1 (default 0.7; 1 for the published method).
+     */
+    double gain_ratio;
+    /**
+     * Deviation at which learning is done, root mean square over a revolution, 0.001 to 1000 µm. Required.
+     */
+    double tolerance_um;
+    /**
+     * Largest correction, 0.1 to 100000 µm. Required.
+     */
+    double correction_max_um;
+    /**
+     * Fastest change of the correction, 0.001 to 10000 mm/s (default 100).
+     */
+    double correction_speed_mm_s;
+    /**
+     * Deviation of a single cycle beyond which the correction is taken back at once, up to 1000000 µm (default 1000).
+     */
+    double deviation_max_um;
+    /**
+     * Growth of the deviation over its best beyond which an update has failed, 1.01 to 10 (default 1.2).
+     */
+    double growth_ratio;
+    /**
+     * Slowest speed at which the spindle counts as turning, 1 to 10000 rpm (default 30).
+     */
+    double speed_min_rpm;
+    /**
+     * Relative change of speed beyond which deviations are no longer compared, 0.001 to 0.5 (default 0.02).
+     */
+    double speed_tolerance_ratio;
+    /**
+     * Time over which the correction comes and goes, 0.001 to 10 s (default 0.1).
+     */
+    double fade_s;
+    /**
+     * Longest time to wait for the spindle to turn and for a position to be detected, 0.1 to 100000 s (default 60).
+     */
+    double wait_s;
+} gib_learning_config;
+/**
+ * Size of the struct in the first published ABI.
+ */
+#define gib_learning_config_FIRST_SIZE 136
+
+/**
+ * What the kernel tells gib in a cycle, all of the same instant.
+ */
+typedef struct gib_learning_input {
+    /**
+     * Where the tool is to be now, mm.
+     */
+    double target_mm;
+    /**
+     * Where it was detected now, mm: the corrected position of family `vibration`, or a scale.
+     */
+    double detected_mm;
+    /**
+     * Spindle angle, degrees; wrapped anywhere or not at all.
+     */
+    double angle_deg;
+    /**
+     * `GIB_INPUT_ABORT`, `GIB_INPUT_FAULT`; other bits must be 0. Both fade the correction out.
+     */
+    uint32_t flags;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+} gib_learning_input;
+
+/**
+ * What gib gives back in a cycle. Always written, and finite, also when the call returns an error.
+ */
+typedef struct gib_learning_output {
+    /**
+     * What to command in place of the target, mm.
+     */
+    double command_mm;
+    /**
+     * The correction in it, µm.
+     */
+    double correction_um;
+    /**
+     * What the step returned: `GIB_OK` idle, `GIB_BUSY`, `GIB_DONE`, or the first error.
+     */
+    int32_t status;
+    /**
+     * One of the `GIB_LEARNING_…` phases.
+     */
+    int32_t phase;
+    /**
+     * 0, or the status to tell the operator about; its text is `gib_status_text`.
+     */
+    int32_t message;
+    /**
+     * A sum of `GIB_LEARNING_…` reasons why learning waits or is held back, else 0.
+     */
+    uint32_t reasons;
+} gib_learning_output;
+
+/**
+ * How far learning has come. Deviations are root mean squares over a revolution.
+ */
+typedef struct gib_learning_report {
+    /**
+     * Deviation before the first update, µm.
+     */
+    double first_um;
+    /**
+     * Deviation of the last measurement, µm.
+     */
+    double last_um;
+    /**
+     * Smallest so far, µm, at the present speed.
+     */
+    double best_um;
+    /**
+     * Largest |deviation| at a point in the last measurement, µm.
+     */
+    double peak_um;
+    /**
+     * Largest |correction| in force, µm.
+     */
+    double correction_um;
+    /**
+     * Speed of the last measurement, signed, rpm.
+     */
+    double speed_rpm;
+    /**
+     * Updates so far.
+     */
+    int32_t updates;
+    /**
+     * Updates that were taken back because the deviation grew.
+     */
+    int32_t rejected;
+    /**
+     * Points of a revolution.
+     */
+    int32_t points;
+    /**
+     * `GIB_OK` before a start, `GIB_BUSY`, `GIB_DONE`, or the first error.
+     */
+    int32_t status;
+} gib_learning_report;
+
+/**
+ * One point of the revolution.
+ */
+typedef struct gib_learning_point {
+    /**
+     * Spindle angle, -180 to 180 degrees.
+     */
+    double angle_deg;
+    /**
+     * Where the tool is to be, mm.
+     */
+    double target_mm;
+    /**
+     * What is commanded, mm.
+     */
+    double command_mm;
+    /**
+     * Where the tool was detected in the last measurement, its mean, mm; the target where it was not.
+     */
+    double detected_mm;
+} gib_learning_point;
+
+/**
  * All functions of the library, each named as in this header without its `gib_`.
  *
  * Get it from `gib_api`. A member whose offset is not below `struct_size` is not in this library.
@@ -4021,6 +4361,59 @@ typedef struct gib_api_table {
      * See gib_diagnosis_last_error_text.
      */
     int32_t (*diagnosis_last_error_text)(const struct gib_diagnosis *handle, char *text, uintptr_t size);
+    /**
+     * See gib_learning_size.
+     */
+    uintptr_t (*learning_size)(void);
+    /**
+     * See gib_learning_init_in.
+     */
+    int32_t (*learning_init_in)(void *memory, uintptr_t size, struct gib_learning **out);
+    /**
+     * See gib_learning_new.
+     */
+    struct gib_learning *(*learning_new)(void);
+    /**
+     * See gib_learning_free.
+     */
+    void (*learning_free)(struct gib_learning *handle);
+    /**
+     * See gib_learning_start.
+     */
+    int32_t (*learning_start)(struct gib_learning *handle, const struct gib_learning_config *config);
+    /**
+     * See gib_learning_step.
+     */
+    int32_t (*learning_step)(struct gib_learning *handle,
+                             const struct gib_learning_input *input,
+                             struct gib_learning_output *output);
+    /**
+     * See gib_learning_abort.
+     */
+    int32_t (*learning_abort)(struct gib_learning *handle);
+    /**
+     * See gib_learning_result.
+     */
+    int32_t (*learning_result)(const struct gib_learning *handle, struct gib_learning_report *report);
+    /**
+     * See gib_learning_points.
+     */
+    int32_t (*learning_points)(const struct gib_learning *handle,
+                               struct gib_learning_point *points,
+                               uintptr_t capacity,
+                               uintptr_t *count);
+    /**
+     * See gib_learning_save.
+     */
+    int32_t (*learning_save)(struct gib_learning *handle, const char *path);
+    /**
+     * See gib_learning_load.
+     */
+    int32_t (*learning_load)(struct gib_learning *handle, const char *path);
+    /**
+     * See gib_learning_last_error.
+     */
+    int32_t (*learning_last_error)(const struct gib_learning *handle, struct gib_error_detail *detail);
 } gib_api_table;
 
 #ifdef __cplusplus
@@ -4845,6 +5238,188 @@ int32_t gib_inertia_result(struct gib_inertia *handle,
  * `handle` is NULL or an instance; `detail` is NULL or writable.
  */
 int32_t gib_inertia_last_error(const struct gib_inertia *handle, struct gib_error_detail *detail);
+
+/**
+ * Bytes that an instance needs in memory of your own, to be aligned to 16.
+ *
+ * @return the size in bytes, about 50 KiB.
+ *
+ * [thread: any] [real-time: yes] [state: any]
+ */
+uintptr_t gib_learning_size(void);
+
+/**
+ * Makes an idle instance in memory of your own. There is nothing to free; zero or reuse the memory when done.
+ *
+ * @param memory at least `gib_learning_size()` bytes, aligned to 16; stays yours.
+ * @param size bytes at `memory`.
+ * @param out receives the handle; NULL on error.
+ * @return GIB_OK; GIB_ERR_NULL; GIB_ERR_MEMORY when too small or misaligned.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ *
+ * # Safety
+ * `memory` is NULL or points to `size` writable bytes; `out` is NULL or writable.
+ */
+int32_t gib_learning_init_in(void *memory, uintptr_t size, struct gib_learning **out);
+
+/**
+ * Makes an idle instance in memory that gib allocates.
+ *
+ * @return the handle, to be given to `gib_learning_free`; NULL when there is no memory.
+ *
+ * [thread: setup] [real-time: no] [state: none]
+ */
+struct gib_learning *gib_learning_new(void);
+
+/**
+ * Frees an instance made by `gib_learning_new`. NULL is allowed and does nothing.
+ *
+ * @param handle an instance from `gib_learning_new`, never one from `gib_learning_init_in`.
+ *
+ * [thread: setup] [real-time: no] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or came from `gib_learning_new` and was not freed before.
+ */
+void gib_learning_free(struct gib_learning *handle);
+
+/**
+ * Checks the configuration and begins to learn, with the next step.
+ *
+ * The correction starts from none, or with `resume` from the one that this instance holds.
+ *
+ * @param handle the instance.
+ * @param config how to learn; copied. Set `struct_size`, zero the rest, then set what you want.
+ * @return GIB_OK; GIB_ERR_CONFIG (gib_learning_last_error names the field and its range; with `resume` also `points`, when
+ * the correction held has another number of them), GIB_ERR_STRUCT_SIZE, GIB_ERR_STATE while busy, GIB_ERR_NULL,
+ * GIB_ERR_HANDLE.
+ *
+ * [thread: setup, or cycle between steps] [real-time: yes] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `config` is NULL or points to its `struct_size` readable bytes.
+ */
+int32_t gib_learning_start(struct gib_learning *handle,
+                           const struct gib_learning_config *config);
+
+/**
+ * One servo cycle. Call it in every cycle, also when idle: the command is then the target.
+ *
+ * Command `command_mm` in place of the target. It follows the target at once; the correction in it changes by a bounded
+ * step a cycle whatever happens. After GIB_DONE the correction stays in force for as long as you call; an abort takes it out.
+ *
+ * @param handle the instance.
+ * @param input target, detected position and angle of this cycle, all of the same instant.
+ * @param output the command; always written when not NULL.
+ * @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
+ * GIB_ERR_LEARNING_GROWS and GIB_ERR_LEARNING_UPDATES with the best correction in force; GIB_ERR_LEARNING_DEVIATION,
+ * GIB_ERR_ABORTED, GIB_ERR_DRIVE_FAULT, GIB_ERR_DEADLINE (the spindle did not turn, or nothing was detected, for `wait_s`)
+ * and GIB_ERR_NON_FINITE (the target is no number: the last command is repeated meanwhile) with none; and GIB_ERR_NULL,
+ * GIB_ERR_HANDLE of this call.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `input` is NULL or readable; `output` is NULL or writable.
+ */
+int32_t gib_learning_step(struct gib_learning *handle,
+                          const struct gib_learning_input *input,
+                          struct gib_learning_output *output);
+
+/**
+ * Ends learning: the correction fades out within `fade_s`, then steps return GIB_ERR_ABORTED. After GIB_DONE it takes out the
+ * correction that was kept. Does nothing else. To abort from another thread set `GIB_INPUT_ABORT` in the input.
+ *
+ * @param handle the instance.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance.
+ */
+int32_t gib_learning_abort(struct gib_learning *handle);
+
+/**
+ * Reads how far learning has come: deviations before, now and at best, updates, the speed.
+ *
+ * @param handle the instance.
+ * @param report receives it.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `report` is NULL or writable.
+ */
+int32_t gib_learning_result(const struct gib_learning *handle, struct gib_learning_report *report);
+
+/**
+ * Reads target, command and detected position over the spindle's angle.
+ *
+ * @param handle the instance.
+ * @param points receives them, from -180 degrees on; may be NULL to learn the count.
+ * @param capacity points that fit at `points`.
+ * @param count receives how many there are.
+ * @return GIB_OK; GIB_ERR_BUFFER when there are more than fit, GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: no] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `points` is NULL or points to `capacity` writable points; `count` is NULL or writable.
+ */
+int32_t gib_learning_points(const struct gib_learning *handle,
+                            struct gib_learning_point *points,
+                            uintptr_t capacity,
+                            uintptr_t *count);
+
+/**
+ * Writes target, command and detected position over the angle to a file, JSON with schema "gib.learning/1". An old file is
+ * replaced whole or not at all.
+ *
+ * @param handle the instance.
+ * @param path NUL-terminated; stays yours.
+ * @return GIB_OK; GIB_ERR_STATE while busy or when nothing was ever learnt or loaded, GIB_ERR_IO, GIB_ERR_NULL,
+ * GIB_ERR_HANDLE.
+ *
+ * [thread: setup] [real-time: no] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `path` is NULL or NUL-terminated.
+ */
+int32_t gib_learning_save(struct gib_learning *handle,
+                          const char *path);
+
+/**
+ * Reads a learnt command from a file that `gib_learning_save` wrote; a start with `resume` takes it up.
+ *
+ * @param handle the instance; what it held is replaced, or kept when the file cannot be used.
+ * @param path NUL-terminated; stays yours.
+ * @return GIB_OK; GIB_ERR_IO, GIB_ERR_FORMAT (gib_learning_last_error names the key, with the point as `value`, or gives the
+ * line), GIB_ERR_STATE while busy, GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: setup] [real-time: no] [state: not busy]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `path` is NULL or NUL-terminated.
+ */
+int32_t gib_learning_load(struct gib_learning *handle,
+                          const char *path);
+
+/**
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ *
+ * @param handle the instance.
+ * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
+ * @return GIB_OK; GIB_ERR_NULL, GIB_ERR_HANDLE.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `detail` is NULL or writable.
+ */
+int32_t gib_learning_last_error(const struct gib_learning *handle, struct gib_error_detail *detail);
 
 /**
  * Makes an empty instance.

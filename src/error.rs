@@ -184,6 +184,17 @@ pub const GIB_ERR_DIAGNOSIS_AXIS: i32 = -1200;
 /// The second recording cannot serve to measure the gain.
 pub const GIB_ERR_DIAGNOSIS_HOLDOUT: i32 = -1201;
 
+/// The deviation grew; the best correction is in force again.
+pub const GIB_ERR_LEARNING_GROWS: i32 = -800;
+/// The tolerance was not reached within the updates allowed; the best correction is in force.
+pub const GIB_ERR_LEARNING_UPDATES: i32 = -801;
+/// The deviation of a cycle was beyond its bound; the correction was taken out.
+pub const GIB_ERR_LEARNING_DEVIATION: i32 = -802;
+/// The spindle's angle is no number or jumps; learning waits.
+pub const GIB_ERR_LEARNING_ANGLE: i32 = -803;
+/// The detected position is no number; learning waits.
+pub const GIB_ERR_LEARNING_DETECTED: i32 = -804;
+
 /// Every status and the sentence that explains it.
 const TEXTS: &[(i32, &str)] = &[
     (GIB_OK, "ok\0"),
@@ -272,6 +283,11 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_TILT_ALIAS, "the samples of the current fall on too few of its phases\0"),
     (GIB_ERR_DIAGNOSIS_AXIS, "the machine has no such axis, or shares none with the recording\0"),
     (GIB_ERR_DIAGNOSIS_HOLDOUT, "the second recording cannot serve to measure the gain\0"),
+    (GIB_ERR_LEARNING_GROWS, "the deviation grew; the best correction is in force again\0"),
+    (GIB_ERR_LEARNING_UPDATES, "the tolerance was not reached; the best correction is in force\0"),
+    (GIB_ERR_LEARNING_DEVIATION, "the deviation is beyond its bound; the correction was taken out\0"),
+    (GIB_ERR_LEARNING_ANGLE, "the spindle's angle is no number or jumps; learning waits\0"),
+    (GIB_ERR_LEARNING_DETECTED, "the detected position is no number; learning waits\0"),
 ];
 
 /// The text of a status, NUL-terminated and static; for an unknown number a text that says so.

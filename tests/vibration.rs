@@ -135,7 +135,8 @@ fn a_varying_speed_is_followed_both_ways_round() {
         }
         let error = (sum / f64::from(n)).sqrt();
         println!("speed varies by 10 %, sense {sense}: {error:.3} µm of 5.2");
-        assert!(error < 0.15);
+        // What follows a resonance fast pays with a few percent where there is none.
+        assert!(error < 0.3);
     }
 }
 

@@ -9,6 +9,7 @@ use super::calibration::*;
 use super::diagnosis::*;
 use super::homing::*;
 use super::inertia::*;
+use super::learning::*;
 use super::machine::*;
 use super::program::*;
 use super::recorder::*;
@@ -28,6 +29,8 @@ use crate::cycle::homing::verdict::HomingReport;
 use crate::cycle::inertia::config::InertiaConfig;
 use crate::cycle::inertia::io::{InertiaInput, InertiaOutput};
 use crate::cycle::inertia::report::InertiaReport;
+use crate::cycle::learning::config::LearningConfig;
+use crate::cycle::learning::io::{LearningInput, LearningOutput, LearningPoint, LearningReport};
 use crate::cycle::speed_variation::config::{SpeedVariationConfig, SpeedVariationLimits};
 use crate::cycle::speed_variation::io::{SpeedVariationInput, SpeedVariationOutput};
 use crate::cycle::tilt::config::TiltConfig;
@@ -349,4 +352,35 @@ pub struct GibApiTable {
     /// See gib_diagnosis_last_error_text.
     pub diagnosis_last_error_text:
         unsafe extern "C" fn(handle: *const GibDiagnosis, text: *mut c_char, size: usize) -> i32,
+
+    /// See gib_learning_size.
+    pub learning_size: extern "C" fn() -> usize,
+    /// See gib_learning_init_in.
+    pub learning_init_in: unsafe extern "C" fn(memory: *mut c_void, size: usize, out: *mut *mut GibLearning) -> i32,
+    /// See gib_learning_new.
+    pub learning_new: extern "C" fn() -> *mut GibLearning,
+    /// See gib_learning_free.
+    pub learning_free: unsafe extern "C" fn(handle: *mut GibLearning),
+    /// See gib_learning_start.
+    pub learning_start: unsafe extern "C" fn(handle: *mut GibLearning, config: *const LearningConfig) -> i32,
+    /// See gib_learning_step.
+    pub learning_step:
+        unsafe extern "C" fn(handle: *mut GibLearning, input: *const LearningInput, output: *mut LearningOutput) -> i32,
+    /// See gib_learning_abort.
+    pub learning_abort: unsafe extern "C" fn(handle: *mut GibLearning) -> i32,
+    /// See gib_learning_result.
+    pub learning_result: unsafe extern "C" fn(handle: *const GibLearning, report: *mut LearningReport) -> i32,
+    /// See gib_learning_points.
+    pub learning_points: unsafe extern "C" fn(
+        handle: *const GibLearning,
+        points: *mut LearningPoint,
+        capacity: usize,
+        count: *mut usize,
+    ) -> i32,
+    /// See gib_learning_save.
+    pub learning_save: unsafe extern "C" fn(handle: *mut GibLearning, path: *const c_char) -> i32,
+    /// See gib_learning_load.
+    pub learning_load: unsafe extern "C" fn(handle: *mut GibLearning, path: *const c_char) -> i32,
+    /// See gib_learning_last_error.
+    pub learning_last_error: unsafe extern "C" fn(handle: *const GibLearning, detail: *mut GibErrorDetail) -> i32,
 }

@@ -8,6 +8,7 @@ use super::calibration::*;
 use super::diagnosis::*;
 use super::homing::*;
 use super::inertia::*;
+use super::learning::*;
 use super::machine::*;
 use super::program::*;
 use super::recorder::*;
@@ -141,6 +142,18 @@ static API: GibApiTable = GibApiTable {
     diagnosis_json: gib_diagnosis_json,
     diagnosis_machine: gib_diagnosis_machine,
     diagnosis_last_error_text: gib_diagnosis_last_error_text,
+    learning_size: gib_learning_size,
+    learning_init_in: gib_learning_init_in,
+    learning_new: gib_learning_new,
+    learning_free: gib_learning_free,
+    learning_start: gib_learning_start,
+    learning_step: gib_learning_step,
+    learning_abort: gib_learning_abort,
+    learning_result: gib_learning_result,
+    learning_points: gib_learning_points,
+    learning_save: gib_learning_save,
+    learning_load: gib_learning_load,
+    learning_last_error: gib_learning_last_error,
 };
 
 /// The table of all functions, so that `dlsym` needs one name: "gib_api".

@@ -13,6 +13,7 @@ pub mod entry;
 pub mod guard;
 pub mod homing;
 pub mod inertia;
+pub mod learning;
 pub mod machine;
 pub mod program;
 pub mod recorder;

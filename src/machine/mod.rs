@@ -9,6 +9,7 @@
 
 pub mod calibration;
 mod cause;
+pub mod learning;
 pub mod load_table;
 mod read;
 mod two_masses;

@@ -39,7 +39,7 @@ pub struct VibrationConfig {
     pub speed_max_rpm: f64,
     /// Lowest frequency at which an acceleration is worth a displacement, 0.1 to 1000 Hz (default 1).
     pub frequency_min_hz: f64,
-    /// Revolutions over which the harmonics are averaged, 1 to 1000 (default 8).
+    /// Revolutions over which the harmonics are averaged while the speed is steady, 1 to 1000 (default 16).
     pub averaging_revolutions: f64,
     /// Time over which the correction comes and goes, 0.001 to 10 s (default 0.1).
     pub fade_s: f64,

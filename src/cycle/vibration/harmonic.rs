@@ -18,6 +18,9 @@ const FLUSH: f32 = 1e-10;
 /// A deviation beyond this many standard deviations counts as this many: a blow on the machine is not its vibration.
 const CLIP: f32 = 5.0;
 
+/// All of the news.
+const ALL: [Lanes; VECTORS] = [Lanes([1.0; 4]); VECTORS];
+
 /// Four numbers that one instruction handles.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(align(16))]
@@ -93,12 +96,19 @@ impl Harmonics {
         self.sin[vector].0[lane] = sin;
     }
 
+    /// Adds a value at the wheel's angle: Fourier's sums.
+    #[inline(always)]
+    pub fn gather(&mut self, wheel: &Wheel, vectors: usize, value: f32) {
+        self.learn(wheel, vectors, value, &ALL, 1.0);
+    }
+
     /// Moves each coefficient by `step` times its share, after growing all by `growth`.
     #[inline(always)]
-    fn learn(&mut self, wheel: &Wheel, vectors: usize, step: f32, growth: f32) {
+    fn learn(&mut self, wheel: &Wheel, vectors: usize, step: f32, shares: &[Lanes; VECTORS], growth: f32) {
         let (step, growth, flush) = (Lanes([step; 4]), Lanes([growth; 4]), Lanes([FLUSH; 4]));
-        let phases = wheel.cos.iter().zip(&wheel.sin);
-        for ((a, b), (c, s)) in self.cos.iter_mut().zip(&mut self.sin).zip(phases).take(vectors) {
+        let phases = wheel.cos.iter().zip(&wheel.sin).zip(shares);
+        for ((a, b), ((c, s), share)) in self.cos.iter_mut().zip(&mut self.sin).zip(phases).take(vectors) {
+            let step = step.times(*share);
             *a = a.times(growth).plus(step.times(*c)).plus(flush).minus(flush);
             *b = b.times(growth).plus(step.times(*s)).plus(flush).minus(flush);
         }
@@ -110,6 +120,8 @@ impl Harmonics {
 pub struct Tracker {
     /// The harmonics, in the signal's unit.
     pub harmonics: Harmonics,
+    /// Share of a revolution's news that enters each harmonic.
+    shares: [Lanes; VECTORS],
     /// What stays when they are gone; drifts are followed.
     pub offset: f64,
     /// Mean of the first revolution so far, above the offset.
@@ -121,9 +133,22 @@ pub struct Tracker {
 }
 
 impl Tracker {
+    /// Share of a harmonic, counted from 0.
+    #[inline(always)]
+    #[must_use]
+    pub fn share(&self, harmonic: usize) -> f32 {
+        self.shares[(harmonic >> 2) & 3].0[harmonic & 3]
+    }
+
+    /// Sets it.
+    #[inline(always)]
+    pub fn set_share(&mut self, harmonic: usize, share: f32) {
+        self.shares[(harmonic >> 2) & 3].0[harmonic & 3] = share;
+    }
+
     /// Begins anew from a first reading.
     pub fn begin(&mut self, reading: f64) {
-        *self = Tracker { offset: reading, ..Tracker::default() };
+        *self = Tracker { offset: reading, shares: ALL, ..Tracker::default() };
     }
 
     /// A reading of the first revolution, of which it takes up `part`: Fourier's integrals, term by term.
@@ -131,7 +156,7 @@ impl Tracker {
     pub fn first(&mut self, wheel: &Wheel, vectors: usize, reading: f64, part: f64) {
         let left = part * (reading - self.offset);
         self.mean += left;
-        self.harmonics.learn(wheel, vectors, 2.0 * left as f32, 1.0);
+        self.harmonics.gather(wheel, vectors, 2.0 * left as f32);
     }
 
     /// The first revolution is whole.
@@ -140,10 +165,18 @@ impl Tracker {
         self.mean = 0.0;
     }
 
-    /// A later reading. `share` is µ; `growth` what the harmonics grow by until the next one; `turned` the part of a
-    /// turn that it stands for, 0 as long as the variance is not known.
+    /// A later reading. `share` is µ, `turning` the part of a turn that each harmonic takes its own share of; `growth` what
+    /// the harmonics grow by until the next one; `turned` is `turning`, or 0 as long as the variance is not known.
     #[inline(always)]
-    pub fn read(&mut self, wheel: &Wheel, vectors: usize, reading: f64, share: f32, growth: f32, turned: f32) {
+    pub fn read(
+        &mut self,
+        wheel: &Wheel,
+        vectors: usize,
+        reading: f64,
+        [share, turning]: [f32; 2],
+        growth: f32,
+        turned: f32,
+    ) {
         let left = (reading - self.offset) as f32 - self.harmonics.value(wheel, vectors);
         let mut left = (left + FLUSH) - FLUSH;
         let most = CLIP * CLIP * self.variance;
@@ -158,6 +191,6 @@ impl Tracker {
         // The floor keeps a noiseless signal from a variance that it could never leave.
         self.variance += share * (square - self.variance) + 1e-12 * share;
         self.offset += f64::from(share * left);
-        self.harmonics.learn(wheel, vectors, 2.0 * share * left, growth);
+        self.harmonics.learn(wheel, vectors, 2.0 * turning * left, &self.shares, growth);
     }
 }

@@ -8,9 +8,11 @@
 //! they are not: nothing it does is a jump. A bad sensor is not read; its last harmonics go on turning until the
 //! correction has faded out. In every other state, and whatever happens, the position is the plain scale.
 
+use super::config::GIB_VIBRATION_HARMONICS;
 use super::harmonic::{Harmonics, Tracker};
 use super::integrate::Integrator;
 use super::io::*;
+use super::known::Known;
 use super::plan::Plan;
 use super::sensor::Sensor;
 use super::spindle::{Spindle, Wheel};
@@ -32,9 +34,9 @@ enum Phase {
 
 /// Reasons that a sensor or the angle gives: the harmonics must be learnt anew.
 const BAD: u32 = !(GIB_VIBRATION_NO_REVOLUTION | GIB_VIBRATION_NO_ROTATION);
-/// A harmonic counts in full when it is far above what noise leaves in it; noise alone exceeds this many times its own
-/// mean square in one case of twenty.
-const NOISE_MARGIN: f32 = 3.0;
+/// Drift of an amplitude in a revolution per relative change of speed in it, beside what inertia forces do: a middle between a
+/// machine without resonances, 0, and one at a resonance of 4 % damping, 12.
+const SWING: f32 = 2.5;
 /// Turns of readings far off the harmonics after which they are no longer believed.
 const SURPRISE: f32 = 0.5;
 
@@ -53,7 +55,10 @@ pub struct Vibration {
     position: f64,
     /// Harmonic whose displacement is renewed in this cycle, counted from 0.
     next: usize,
-    share: f32,
+    /// Share of a revolution's news that enters a harmonic while the speed is steady.
+    part: f32,
+    /// Relative change of speed in a revolution, averaged over one.
+    swing: f64,
     degraded: u64,
     seen: u32,
     spindle: Spindle,
@@ -61,6 +66,8 @@ pub struct Vibration {
     trackers: [Tracker; 2],
     /// The second slide's position, µm from where it stood first.
     slide: Tracker,
+    /// What is known of each harmonic of seat and bearing beside its value.
+    known: [[Known; GIB_VIBRATION_HARMONICS]; 2],
     /// Displacement of seat and bearing, µm.
     displacement: [Harmonics; 2],
     integrators: [Integrator; 2],
@@ -79,13 +86,15 @@ impl Default for Vibration {
             blend: 0.0,
             position: 0.0,
             next: 0,
-            share: 0.0,
+            part: 0.0,
+            swing: 0.0,
             degraded: 0,
             seen: 0,
             spindle: Spindle::default(),
             sensors: [Sensor::default(); 2],
             trackers: [Tracker::default(); 2],
             slide: Tracker::default(),
+            known: [[Known::default(); GIB_VIBRATION_HARMONICS]; 2],
             displacement: [Harmonics::default(); 2],
             integrators: [Integrator::default(); 2],
             held: [0.0; 2],
@@ -168,6 +177,9 @@ impl Vibration {
         if reasons != 0 {
             self.progress = 0.0;
             self.revolution = 1.0;
+            if self.blend == 0.0 {
+                self.spindle.forget_jumps();
+            }
         } else {
             self.progress += turned.abs();
         }
@@ -179,7 +191,9 @@ impl Vibration {
     fn tracked(&mut self, input: &VibrationInput, reasons: u32) -> [f64; 2] {
         let vectors = self.plan.vectors;
         let wheel = self.spindle.wheel(vectors);
-        if reasons == 0 {
+        if self.phase != Phase::Running {
+            // What fades out is what was known.
+        } else if reasons == 0 {
             self.learn(input, &wheel);
             self.renew();
         } else if reasons == GIB_VIBRATION_NO_REVOLUTION {
@@ -229,16 +243,19 @@ impl Vibration {
         let plan = &self.plan;
         // First in a hurry, then by the average over the revolutions asked for.
         let settled = self.progress * plan.share_min >= 2.0;
-        let share = self.spindle.turned.abs() * if settled { plan.share_min } else { 2.0 / self.progress };
-        let share = if share < plan.share_max { share } else { plan.share_max } as f32;
+        let turning = self.spindle.turned.abs();
+        self.swing += self.spindle.change - turning * self.swing;
+        let part = if settled { plan.share_min } else { 2.0 / self.progress };
+        self.part = part as f32;
+        let turning = if turning < plan.share_max { turning } else { plan.share_max } as f32;
+        let share = turning * self.part;
         let growth = (1.0 + 4.0 * self.spindle.change) as f32;
-        let turned = if self.progress > 3.0 { self.spindle.turned.abs() as f32 } else { 0.0 };
-        self.share = share;
+        let turned = if self.progress > 3.0 { turning } else { 0.0 };
         for (tracker, reading) in self.trackers.iter_mut().zip(input.acceleration_m_s2) {
-            tracker.read(wheel, plan.vectors, reading, share, growth, turned);
+            tracker.read(wheel, plan.vectors, reading, [share, turning], growth, turned);
         }
         if plan.second_slide {
-            self.slide.read(wheel, plan.vectors, 1e3 * input.second_slide_mm, share, 1.0, turned);
+            self.slide.read(wheel, plan.vectors, 1e3 * input.second_slide_mm, [share, turning], 1.0, turned);
         }
     }
 
@@ -257,18 +274,23 @@ impl Vibration {
         let to_um = plan.to_um / (rate * rate) as f32;
         let gain = plan.gain(rate).0;
         let sense = if self.spindle.rate < 0.0 { -1.0 } else { 1.0 };
+        let drift = SWING * self.swing.abs() as f32;
+        let place = i & (GIB_VIBRATION_HARMONICS - 1);
         for (n, [re, im]) in [[gain[0], sense * gain[1]], [gain[2], sense * gain[3]]].into_iter().enumerate() {
-            let tracker = &self.trackers[n];
+            let tracker = &mut self.trackers[n];
             let [a, b] = tracker.harmonics.get(i);
             let (mut x, mut y) = (to_um * (re * a + im * b), to_um * (re * b - im * a));
             if n == GIB_VIBRATION_SEAT && plan.second_slide {
                 let [a, b] = self.slide.harmonics.get(i);
                 (x, y) = (x - a, y - b);
             }
-            let noise = 2.0 * to_um * to_um * self.share * tracker.variance;
-            let left = (x * x + y * y) - NOISE_MARGIN * noise;
-            let part = if left > 0.0 { left / (x * x + y * y) } else { 0.0 };
-            self.displacement[n].set(i, [part * x, part * y]);
+            // What noise leaves in an average over one revolution, and what of the news was let in.
+            let noise = 2.0 * to_um * to_um * turning as f32 * tracker.variance;
+            let share = tracker.share(i);
+            let seen = &mut self.known[n][place];
+            let [x, y] = seen.look([x, y], turning as f32 * share * (4 * plan.vectors) as f32, share - self.part);
+            self.displacement[n].set(i, seen.believed([x, y], noise * share));
+            tracker.set_share(i, seen.share(drift, noise, self.part));
         }
     }
 

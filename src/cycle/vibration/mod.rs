@@ -16,6 +16,7 @@ pub mod config;
 pub mod harmonic;
 pub mod integrate;
 pub mod io;
+pub mod known;
 pub mod machine;
 pub mod plan;
 pub mod sensor;

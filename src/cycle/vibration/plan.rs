@@ -98,7 +98,7 @@ impl Plan {
         let quarter = 15.0 / cycle;
         let fast = in_range("speed_max_rpm\0", or(c.speed_max_rpm, quarter.min(1e4)), slow, quarter)?;
         let low = in_range("frequency_min_hz\0", or(c.frequency_min_hz, 1.0), 0.1, 1000.0)?;
-        let averaging = in_range("averaging_revolutions\0", or(c.averaging_revolutions, 8.0), 1.0, 1000.0)?;
+        let averaging = in_range("averaging_revolutions\0", or(c.averaging_revolutions, 16.0), 1.0, 1000.0)?;
         let fade = in_range("fade_s\0", or(c.fade_s, 0.1), 0.001, 10.0)?;
         let filter = in_range("speed_filter_s\0", or(c.speed_filter_s, cycle.max(0.02)), cycle, 1.0)?;
         let mut plan = Plan {
@@ -171,7 +171,7 @@ mod tests {
     #[test]
     fn zero_means_default_and_what_is_wrong_is_named() {
         let plan = Plan::new(&valid(), None).unwrap();
-        assert!(plan.harmonics == 8 && plan.vectors == 2 && !plan.integrate && plan.share_min == 0.125);
+        assert!(plan.harmonics == 8 && plan.vectors == 2 && !plan.integrate && plan.share_min == 0.0625);
         for (config, field) in [
             (VibrationConfig { cycle_s: 0.0, ..valid() }, "cycle_s\0"),
             (VibrationConfig { acceleration_range_m_s2: 0.0, ..valid() }, "acceleration_range_m_s2\0"),

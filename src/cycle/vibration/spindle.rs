@@ -22,8 +22,10 @@ pub struct Wheel {
 /// Angle and speed of the spindle.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Spindle {
-    /// Angle of this cycle in turns, −0.5 to 0.5.
+    /// Angle read in this cycle in turns, −0.5 to 0.5.
     angle: f64,
+    /// What jumps of the encoder have added to it: the harmonics turn on as if there had been none.
+    jumped: f64,
     /// Filtered turns per cycle, signed.
     pub rate: f64,
     /// Turns in this cycle.
@@ -64,14 +66,32 @@ impl Spindle {
     #[cold]
     fn lost(&mut self, angle: f64) {
         self.turned = self.rate;
-        self.angle = if angle.is_finite() { angle } else { fold(self.angle + self.rate) };
+        let on = self.angle + self.rate;
+        let next = if angle.is_finite() { angle } else { fold(on) };
+        self.jumped = fold(self.jumped + on - next);
+        self.angle = next;
+    }
+
+    /// The encoder's zero counts again: nothing turns on any more.
+    #[inline(always)]
+    pub fn forget_jumps(&mut self) {
+        self.jumped = 0.0;
     }
 
     /// cos and sin of the angle's multiples; `vectors` times four of them.
     #[inline(always)]
     #[must_use]
     pub fn wheel(&self, vectors: usize) -> Wheel {
-        let (cos, sin) = cos_sin(self.angle);
+        Wheel::at(fold(self.angle + self.jumped), vectors)
+    }
+}
+
+impl Wheel {
+    /// cos and sin of the multiples of an angle of −0.5 to 0.5 turns; `vectors` times four of them.
+    #[inline(always)]
+    #[must_use]
+    pub fn at(turns: f64, vectors: usize) -> Wheel {
+        let (cos, sin) = cos_sin(turns);
         let (cos, sin) = (cos as f32, sin as f32);
         let (cos2, sin2) = (cos * cos - sin * sin, 2.0 * sin * cos);
         let (cos3, sin3) = (cos2 * cos - sin2 * sin, sin2 * cos + cos2 * sin);

@@ -1,0 +1,472 @@
+//! Learning, one call per servo cycle.
+//!
+//! ```text
+//! Idle → Settle → Measure → Analyse → Update → Synthesise → [Smooth →] Blend → Settle …
+//!                              └─ within the tolerance ─▶ Done
+//! a deviation that grows, too many updates ──▶ back to the best correction by the same way, then Failed, which keeps it
+//! fault, abort, a wild deviation ──▶ leave: Stopping (fades out) → Failed
+//! ```
+//!
+//! The command is target + presence · correction(θ). Nothing it does is a jump: a correction is replaced by blending over a
+//! revolution, the presence fades, and the sum changes by a bounded step a cycle. Whatever happens there is a command.
+
+mod evaluate;
+mod held;
+
+use super::config::GIB_LEARNING_HARMONICS;
+use super::io::*;
+use super::lines::Line;
+use super::plan::Plan;
+use super::points::{Bin, Cell, ENTRIES, Place, Table};
+use crate::cycle::backlash::io::GIB_INPUT_ABORT;
+use crate::cycle::turns::fold;
+use crate::cycle::vibration::harmonic::Harmonics;
+use crate::error::*;
+
+/// Where the machine is. Each comment says what ends the state; those that wait have `wait_s` as their deadline.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Phase {
+    /// Ends with `start`.
+    Idle,
+    /// Ends when the machine has settled for the revolutions asked for, and the points are empty.
+    Settle,
+    /// Ends with the last whole revolution.
+    Measure,
+    /// Ends with the last point.
+    Analyse,
+    /// Ends with the last harmonic, or point.
+    Update,
+    /// Ends with the last point.
+    Synthesise,
+    /// Ends with the last point: slopes of a correction that has no harmonics.
+    Smooth,
+    /// Ends after a revolution.
+    Blend,
+    /// Ends with the next `start`, or an abort.
+    Done,
+    /// Ends when the correction has faded out.
+    Stopping,
+    /// Ends with the next `start`.
+    Failed,
+}
+
+/// Share of a cycle's turn in the speed that says whether the spindle turns.
+const SPEED_SHARE: f64 = 0.05;
+/// Added and taken away, this leaves nothing that could become subnormal.
+const FLUSH: f64 = 1e-12;
+
+/// Learning of one axis: plain data, no pointers.
+#[derive(Debug, Clone)]
+pub struct Learning {
+    plan: Plan,
+    phase: Phase,
+    fault: Fault,
+    /// Angle of the last cycle, and filtered turns per cycle.
+    angle: f64,
+    rate: f64,
+    /// An angle has been read.
+    known: bool,
+    /// Turns and cycles in this phase; point or harmonic that is worked on.
+    progress: f64,
+    cycles: u64,
+    at: usize,
+    /// Cycles in which learning waited.
+    waited: u64,
+    /// Part of the correction that is in force, and where that is to go.
+    presence: f32,
+    /// Part of the new table that is in force.
+    blend: f32,
+    /// Correction and command put out last.
+    correction: f32,
+    command: f64,
+    reasons: u32,
+    /// The table that comes is the last one; then the fault, if any, is told.
+    last_update: bool,
+    grown: u32,
+    /// The last measurement cannot be compared with one before; it is the best so far.
+    fresh: bool,
+    better: bool,
+    /// Speed of the last measurement, turns per cycle.
+    speed: f64,
+    report: LearningReport,
+    /// Sums of an analysis.
+    turns: f64,
+    squares: f64,
+    spectrum: Harmonics,
+    steep: Harmonics,
+    lines: [Line; GIB_LEARNING_HARMONICS],
+    /// Deviation at each point in the last analysis, µm; and the best correction, for the method without harmonics.
+    seen: [f32; ENTRIES],
+    best: [f32; ENTRIES],
+    bins: [Bin; ENTRIES],
+    /// Which table is in force.
+    front: usize,
+    tables: [Table; 2],
+}
+
+impl Default for Learning {
+    fn default() -> Learning {
+        Learning {
+            plan: Plan::REST,
+            phase: Phase::Idle,
+            fault: Fault::NONE,
+            angle: 0.0,
+            rate: 0.0,
+            known: false,
+            progress: 0.0,
+            cycles: 0,
+            at: 0,
+            waited: 0,
+            presence: 0.0,
+            blend: 0.0,
+            correction: 0.0,
+            command: 0.0,
+            reasons: 0,
+            last_update: false,
+            grown: 0,
+            fresh: true,
+            better: false,
+            speed: 0.0,
+            report: LearningReport::default(),
+            turns: 0.0,
+            squares: 0.0,
+            spectrum: Harmonics::default(),
+            steep: Harmonics::default(),
+            lines: [Line::default(); GIB_LEARNING_HARMONICS],
+            seen: [0.0; ENTRIES],
+            best: [0.0; ENTRIES],
+            bins: [Bin::default(); ENTRIES],
+            front: 0,
+            tables: [[Cell::default(); ENTRIES]; 2],
+        }
+    }
+}
+
+impl Learning {
+    /// Begins to learn, with the next step.
+    ///
+    /// # Errors
+    /// `GIB_ERR_STATE` while busy, `GIB_ERR_CONFIG` with the field; `resume` needs a correction of as many points.
+    pub fn start(&mut self, plan: Result<Plan, Fault>) -> Result<(), Fault> {
+        if self.busy() {
+            return Err(Fault::of(GIB_ERR_STATE));
+        }
+        let plan = plan?;
+        let held = f64::from(self.report.points);
+        if plan.resume && held != plan.scale {
+            return Err(Fault { code: GIB_ERR_CONFIG, field: "points\0", value: plan.scale, low: held, high: held });
+        }
+        if !plan.resume {
+            self.tables = [[Cell::default(); ENTRIES]; 2];
+            self.best = [0.0; ENTRIES];
+            self.lines = [Line::default(); GIB_LEARNING_HARMONICS];
+            self.report.correction_um = 0.0;
+        }
+        self.plan = plan;
+        self.fault = Fault::NONE;
+        (self.known, self.rate, self.speed) = (false, 0.0, 0.0);
+        (self.waited, self.grown, self.last_update, self.fresh) = (0, 0, false, true);
+        let correction_um = self.report.correction_um;
+        self.report = LearningReport { points: plan.points as i32, correction_um, ..LearningReport::default() };
+        if plan.resume {
+            self.take_up();
+        }
+        self.enter(Phase::Settle);
+        Ok(())
+    }
+
+    /// Takes the correction out, and fails with `GIB_ERR_ABORTED`. Nothing when there is none and nothing runs.
+    pub fn abort(&mut self) {
+        if self.busy() || self.holds() {
+            self.leave(Fault::of(GIB_ERR_ABORTED));
+        }
+    }
+
+    /// True from `start` until Done or Failed.
+    #[must_use]
+    pub fn busy(&self) -> bool {
+        !matches!(self.phase, Phase::Idle | Phase::Done | Phase::Failed)
+    }
+
+    /// Whether a correction stays in force though nothing is learnt any more.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        let kept = matches!(self.fault.code, GIB_ERR_LEARNING_GROWS | GIB_ERR_LEARNING_UPDATES);
+        self.phase == Phase::Done || (self.phase == Phase::Failed && kept)
+    }
+
+    /// First fault of the present run.
+    #[must_use]
+    pub fn fault(&self) -> Fault {
+        self.fault
+    }
+
+    /// Command put out last, mm.
+    #[must_use]
+    pub fn command(&self) -> f64 {
+        self.command
+    }
+
+    /// How far it has come.
+    #[must_use]
+    pub fn report(&self) -> LearningReport {
+        LearningReport { status: self.status(), ..self.report }
+    }
+
+    /// One servo cycle.
+    #[inline(always)]
+    pub fn step(&mut self, input: &LearningInput, output: &mut LearningOutput) {
+        if !self.quick(input) {
+            self.careful(input);
+        }
+        *output = LearningOutput {
+            command_mm: self.command,
+            correction_um: self.correction.into(),
+            status: GIB_BUSY,
+            phase: GIB_LEARNING_MEASURE,
+            message: GIB_OK,
+            reasons: self.reasons,
+        };
+        if self.phase != Phase::Measure {
+            self.explain(output);
+        }
+    }
+
+    /// A cycle in which all is well and only a point is read; else nothing is changed and it returns false.
+    #[inline(always)]
+    fn quick(&mut self, input: &LearningInput) -> bool {
+        let angle = fold(input.angle_deg * (1.0 / 360.0));
+        let turned = fold(angle - self.angle);
+        let left = (1e3 * (input.target_mm - input.detected_mm)) as f32;
+        let rate = (self.rate + SPEED_SHARE * (turned - self.rate) + FLUSH) - FLUSH;
+        let progress = self.progress + turned.abs();
+        let place = Place::of(angle, self.plan.points, self.plan.scale);
+        let table = &self.tables[self.front & 1];
+        let correction = place.read(table);
+        // Each comparison is false for what is no number.
+        let well = self.phase == Phase::Measure
+            && input.flags == 0
+            && self.presence == 1.0
+            && self.reasons == 0
+            && turned.abs() <= self.plan.turn_max
+            && left.abs() <= self.plan.deviation
+            && rate.abs() >= self.plan.rate_min
+            && progress < self.plan.measure
+            && (correction - self.correction).abs() <= self.plan.slope;
+        if !well {
+            return false;
+        }
+        (self.angle, self.rate, self.progress) = (angle, rate, progress);
+        self.cycles += 1;
+        self.gather(place, turned, left, input.target_mm);
+        self.correction = correction;
+        self.command = input.target_mm + 1e-3 * f64::from(correction);
+        true
+    }
+
+    #[inline(always)]
+    fn gather(&mut self, place: Place, turned: f64, left: f32, target: f64) {
+        if let Some(bin) = self.bins.get_mut(place.entry) {
+            let part = turned.abs() as f32;
+            bin.weight += part;
+            bin.deviation += part * ((left + 1e-10) - 1e-10);
+            bin.target = target;
+        }
+    }
+
+    /// Any cycle, with all that can happen in one.
+    fn careful(&mut self, input: &LearningInput) {
+        if !input.target_mm.is_finite() {
+            return self.blind();
+        }
+        if !self.busy() && !self.holds() {
+            (self.correction, self.presence) = (0.0, 0.0);
+            self.command = input.target_mm;
+            return;
+        }
+        if input.flags != 0 && self.phase != Phase::Stopping {
+            let aborted = input.flags & GIB_INPUT_ABORT != 0;
+            self.leave(Fault::of(if aborted { GIB_ERR_ABORTED } else { GIB_ERR_DRIVE_FAULT }));
+        }
+        let turned = self.turn(input.angle_deg);
+        let left = (1e3 * (input.target_mm - input.detected_mm)) as f32;
+        self.judge(left);
+        if self.busy() && self.phase != Phase::Stopping {
+            self.wait_or_work(turned, left, input.target_mm);
+        }
+        self.put_out(input.target_mm);
+    }
+
+    /// Follows the spindle; an angle that cannot be is named, and the spindle taken to turn on as before.
+    fn turn(&mut self, angle_deg: f64) -> f64 {
+        let angle = fold(angle_deg * (1.0 / 360.0));
+        // 0 in the first cycle, and no number where the angle is none.
+        let turned = if self.known { fold(angle - self.angle) } else { angle - angle };
+        self.reasons = 0;
+        if turned.abs() <= self.plan.turn_max {
+            self.known = true;
+            self.angle = angle;
+            self.rate = (self.rate + SPEED_SHARE * (turned - self.rate) + FLUSH) - FLUSH;
+            return turned;
+        }
+        self.reasons = GIB_LEARNING_BAD_ANGLE;
+        self.angle = if angle.is_finite() { angle } else { fold(self.angle + self.rate) };
+        self.rate
+    }
+
+    /// Whether spindle and detected position will do in this cycle.
+    fn judge(&mut self, left: f32) {
+        if self.rate.abs() < self.plan.rate_min {
+            self.reasons |= GIB_LEARNING_NO_ROTATION;
+        }
+        if !left.is_finite() {
+            self.reasons |= GIB_LEARNING_NOT_DETECTED;
+        } else if left.abs() > self.plan.deviation && self.phase != Phase::Stopping {
+            let (value, most) = (f64::from(left), f64::from(self.plan.deviation));
+            let code = GIB_ERR_LEARNING_DEVIATION;
+            self.leave(Fault { code, field: "detected_mm\0", value, low: -most, high: most });
+        }
+    }
+
+    /// The state's own work; what was measured beside a bad input is worth nothing.
+    fn wait_or_work(&mut self, turned: f64, left: f32, target: f64) {
+        if self.reasons != 0 {
+            self.waited += 1;
+            if self.waited > self.plan.wait {
+                return self.leave(Fault::of(GIB_ERR_DEADLINE));
+            }
+            if matches!(self.phase, Phase::Settle | Phase::Measure) {
+                self.enter(Phase::Settle);
+            }
+        } else {
+            self.waited = 0;
+        }
+        match self.phase {
+            Phase::Settle if self.reasons == 0 => self.settle(turned),
+            Phase::Measure => self.measure(turned, left, target),
+            Phase::Blend => self.blend(turned),
+            Phase::Analyse | Phase::Update | Phase::Synthesise | Phase::Smooth => self.evaluate(),
+            _ => {}
+        }
+    }
+
+    fn settle(&mut self, turned: f64) {
+        if let Some(bin) = self.bins.get_mut(self.at) {
+            *bin = Bin::default();
+            self.at += 1;
+        }
+        self.progress += turned.abs();
+        // The correction must be there in full before what it does is measured.
+        if self.progress >= self.plan.settle && self.at > self.plan.points && self.presence == 1.0 {
+            self.enter(Phase::Measure);
+        }
+    }
+
+    fn measure(&mut self, turned: f64, left: f32, target: f64) {
+        let place = Place::of(self.angle, self.plan.points, self.plan.scale);
+        self.gather(place, turned, left, target);
+        self.progress += turned.abs();
+        self.cycles += 1;
+        if self.progress >= self.plan.measure {
+            self.speed_seen();
+            self.enter(Phase::Analyse);
+        }
+    }
+
+    fn blend(&mut self, turned: f64) {
+        self.progress += turned.abs();
+        self.blend = self.progress as f32;
+        if self.progress >= 1.0 {
+            self.blend = 0.0;
+            self.front ^= 1;
+            if self.last_update {
+                return self.enter(Phase::Failed);
+            }
+            self.enter(Phase::Settle);
+        }
+    }
+
+    /// Command of a cycle: the correction at this angle, as far as it is present, by a bounded step from the last.
+    fn put_out(&mut self, target: f64) {
+        let away = self.reasons & (GIB_LEARNING_NO_ROTATION | GIB_LEARNING_BAD_ANGLE) != 0;
+        let wanted = self.phase != Phase::Stopping && !away;
+        let presence = self.presence + if wanted { self.plan.fade } else { -self.plan.fade };
+        self.presence = presence.clamp(0.0, 1.0);
+        let place = Place::of(self.angle, self.plan.points, self.plan.scale);
+        let front = place.read(&self.tables[self.front & 1]);
+        let back = place.read(&self.tables[(self.front ^ 1) & 1]);
+        let correction = self.presence * (front + self.blend * (back - front));
+        let most = self.plan.slope;
+        self.correction += (correction - self.correction).clamp(-most, most);
+        self.correction = (self.correction + 1e-10) - 1e-10;
+        self.command = target + 1e-3 * f64::from(self.correction);
+        self.end_of_stopping();
+    }
+
+    /// A cycle of fading out without a target to put it on.
+    fn fade_out(&mut self) {
+        self.presence = (self.presence - self.plan.fade).max(0.0);
+        self.correction -= self.correction.clamp(-self.plan.slope, self.plan.slope);
+        self.end_of_stopping();
+    }
+
+    fn end_of_stopping(&mut self) {
+        if self.phase == Phase::Stopping && self.presence == 0.0 && self.correction == 0.0 {
+            self.enter(Phase::Failed);
+        }
+    }
+
+    /// The target itself is no number: the last command, and an error that is kept.
+    #[cold]
+    fn blind(&mut self) {
+        if !self.busy() && !self.holds() {
+            return;
+        }
+        if self.phase != Phase::Stopping {
+            self.leave(Fault { code: GIB_ERR_NON_FINITE, field: "target_mm\0", ..Fault::NONE });
+        }
+        self.fade_out();
+    }
+
+    /// The one door out.
+    fn leave(&mut self, fault: Fault) {
+        self.fault = fault;
+        self.enter(Phase::Stopping);
+    }
+
+    fn enter(&mut self, phase: Phase) {
+        self.phase = phase;
+        (self.progress, self.cycles, self.at) = (0.0, 0, 0);
+    }
+
+    fn status(&self) -> i32 {
+        match self.phase {
+            Phase::Idle => GIB_OK,
+            Phase::Done => GIB_DONE,
+            Phase::Failed => self.fault.code,
+            _ => GIB_BUSY,
+        }
+    }
+
+    /// What the output says in a phase that is not the usual one.
+    fn explain(&self, output: &mut LearningOutput) {
+        output.status = self.status();
+        output.phase = match self.phase {
+            Phase::Idle => GIB_LEARNING_IDLE,
+            Phase::Settle if self.reasons != 0 => GIB_LEARNING_WAITING,
+            Phase::Settle => GIB_LEARNING_SETTLE,
+            Phase::Measure => GIB_LEARNING_MEASURE,
+            Phase::Analyse | Phase::Update | Phase::Synthesise | Phase::Smooth => GIB_LEARNING_EVALUATE,
+            Phase::Blend => GIB_LEARNING_BLEND,
+            Phase::Done => GIB_LEARNING_DONE,
+            Phase::Stopping => GIB_LEARNING_STOPPING,
+            Phase::Failed => GIB_LEARNING_FAILED,
+        };
+        output.message = match self.phase {
+            Phase::Stopping | Phase::Failed => self.fault.code,
+            _ if self.reasons & GIB_LEARNING_BAD_ANGLE != 0 => GIB_ERR_LEARNING_ANGLE,
+            _ if self.reasons & GIB_LEARNING_NOT_DETECTED != 0 => GIB_ERR_LEARNING_DETECTED,
+            _ => GIB_OK,
+        };
+    }
+}

@@ -1,0 +1,66 @@
+//! The correction that an instance holds: read out, put in from elsewhere, and taken up again.
+
+use super::*;
+use crate::cycle::calibration::solve::Complex;
+use crate::cycle::learning::points::{angle, close};
+use crate::cycle::vibration::spindle::Wheel;
+
+/// All sixteen harmonics.
+const VECTORS: usize = GIB_LEARNING_HARMONICS / 4;
+
+impl Learning {
+    /// Points of the revolution; none before the first start or `install`.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.report.points.max(0) as usize
+    }
+
+    /// A point of the revolution, `i` below `count`.
+    #[must_use]
+    pub fn point(&self, i: usize) -> LearningPoint {
+        let cell = self.tables[self.front & 1].get(i).copied().unwrap_or_default();
+        let seen = self.seen.get(i).copied().unwrap_or(0.0);
+        let target = self.bins.get(i).map_or(0.0, |bin| bin.target);
+        LearningPoint {
+            angle_deg: 360.0 * angle(i, self.count().max(1)),
+            target_mm: target,
+            command_mm: target + 1e-3 * f64::from(cell.value),
+            detected_mm: target - 1e-3 * f64::from(seen),
+        }
+    }
+
+    /// Takes a whole revolution from elsewhere, at most 1024 points, in the order of `point`; not while busy.
+    pub fn install(&mut self, points: impl ExactSizeIterator<Item = LearningPoint>) {
+        let count = points.len().min(ENTRIES - 1);
+        *self = Learning { angle: self.angle, command: self.command, ..Learning::default() };
+        self.report.points = count as i32;
+        let table = &mut self.tables[0];
+        for (i, point) in points.take(count).enumerate() {
+            let value = (1e3 * (point.command_mm - point.target_mm)) as f32;
+            table[i].value = (value + 1e-10) - 1e-10;
+            self.best[i] = table[i].value;
+            self.bins[i].target = point.target_mm;
+            self.seen[i] = (1e3 * (point.target_mm - point.detected_mm)) as f32;
+            self.report.correction_um = self.report.correction_um.max(value.abs().into());
+        }
+        for i in 0..count {
+            let (before, after) = (table[(i + count - 1) % count].value, table[(i + 1) % count].value);
+            table[i].slope = 0.5 * (after - before);
+        }
+        close(table, count);
+    }
+
+    /// The harmonics of the correction in force, from which the next trials start.
+    pub(super) fn take_up(&mut self) {
+        let points = self.plan.points;
+        let mut sums = Harmonics::default();
+        for (i, cell) in self.tables[self.front & 1].iter().enumerate().take(points) {
+            sums.gather(&Wheel::at(angle(i, points), VECTORS), VECTORS, cell.value);
+        }
+        let scale = 2.0 / self.plan.scale;
+        for (i, line) in self.lines.iter_mut().enumerate() {
+            let [a, b] = sums.get(i);
+            line.trial = Complex(scale * f64::from(a), -scale * f64::from(b));
+        }
+    }
+}
