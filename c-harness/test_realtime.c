@@ -234,6 +234,9 @@ static int32_t variation_cycle(void)
         variation.config.waveform = (int32_t)(variation.run / 2 % 2);
         gib_speed_variation_start(variation.gib, &variation.config);
     }
+    return out.phase;
+}
+
 /* A lathe for the next three: the plant is not what is timed. */
 static lathe turned;
 static lathe_job turned_job;
