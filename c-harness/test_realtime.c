@@ -6,6 +6,7 @@
 #include "lathe_run.h"
 #include "realtime.h"
 #include "spindle_plant.h"
+#include "tilt_realtime.h"
 
 #include <setjmp.h>
 #include <signal.h>
@@ -405,6 +406,7 @@ static const struct {
     {{"calibration", calibration_prepare, calibration_cycle, calibration.outputs, 4},
      (1u << (GIB_CALIBRATION_FAILED + 1)) - 1u},
     {{"learning", learning_prepare, learning_cycle, learning.outputs, 2}, (1u << (GIB_LEARNING_FAILED + 1)) - 1u},
+    {{"tilt", tilt_prepare, tilt_realtime_cycle, tilt.outputs, 6}, (1u << (GIB_TILT_FAILED + 1)) - 1u},
 };
 #define FAMILY_COUNT (sizeof FAMILIES / sizeof *FAMILIES)
 

@@ -3515,7 +3515,7 @@ typedef struct gib_tilt_report {
      */
     double depth_mm;
     /**
-     * Load at the middle of the path: the row to be added when teaching.
+     * Load at the middle of the first pass; when teaching, of the path at the start's wear: the row to be added.
      */
     double load;
     /**
@@ -3531,7 +3531,7 @@ typedef struct gib_tilt_report {
      */
     double wear_uncertainty_ratio_m;
     /**
-     * The published rule on the two ends of the path: depths, mm; 0 outside the table.
+     * The published rule on the first pass, its start and the point farthest from it: depths, mm; 0 outside the table.
      */
     double two_point_depth_mm[2];
     /**

@@ -5,3 +5,4 @@ pub mod inspection;
 pub mod lost_motion;
 pub mod motion;
 pub mod statistics;
+pub mod tilt;

@@ -14,6 +14,7 @@ mod record;
 mod simulate;
 mod speed_variation;
 mod table;
+mod tilt;
 
 use std::error::Error;
 use std::io::Write;
@@ -67,6 +68,7 @@ enum Command {
     LostMotion(lost_motion::LostMotionCommand),
     Simulate(simulate::Simulate),
     SpeedVariation(speed_variation::SpeedVariationCommand),
+    Tilt(tilt::TiltCommand),
 }
 
 /// Runs the command that was asked for.
@@ -81,6 +83,7 @@ pub fn run() -> ExitCode {
         Command::LostMotion(command) => command.run(),
         Command::Simulate(command) => command.run(),
         Command::SpeedVariation(command) => command.run(),
+        Command::Tilt(command) => command.run(),
     };
     match result {
         Ok(answer) => {

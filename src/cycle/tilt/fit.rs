@@ -84,9 +84,12 @@ pub struct Fit {
     pub deviation: f64,
     /// Blocks without weight.
     pub rejected: u32,
-    /// Blocks at the ends of the main direction, for the two points.
+    /// For the two points: the first block, and the block of the first pass that is farthest from it.
     pub ends: [Block; 2],
-    ends_at: [f64; 2],
+    /// Square of their distance; below 0 without blocks.
+    apart: f64,
+    /// Way in the first pass so far; infinite behind it.
+    first_pass: f64,
 }
 
 impl Fit {
@@ -116,7 +119,8 @@ impl Fit {
         deviation: 0.0,
         rejected: 0,
         ends: [Block { x: 0.0, y: 0.0, value: 0.0, gain: 0.0, load: 0.0, cut: 0.0, along: 0.0, residual: 0.0 }; 2],
-        ends_at: [f64::MAX, f64::MIN],
+        apart: -1.0,
+        first_pass: 0.0,
     };
 
     /// Begins a fit; `wear` is the expected wear (k = 1), 1/m.
@@ -196,7 +200,7 @@ impl Fit {
         block.residual = r;
         let weight = match self.pass {
             0 => {
-                self.ends(block, row[1]);
+                self.ends(block);
                 1.0
             }
             pass if pass <= PASSES[0] => 1.0 / r.abs().max(self.scale),
@@ -224,12 +228,15 @@ impl Fit {
         }
     }
 
-    fn ends(&mut self, block: &Block, u: f64) {
-        if u < self.ends_at[0] {
-            (self.ends_at[0], self.ends[0]) = (u, *block);
+    fn ends(&mut self, block: &Block) {
+        // A pass begins with less way than the one before has ended with.
+        self.first_pass = if block.along >= self.first_pass { block.along } else { f64::INFINITY };
+        if self.apart < 0.0 {
+            (self.ends, self.apart) = ([*block; 2], 0.0);
         }
-        if u > self.ends_at[1] {
-            (self.ends_at[1], self.ends[1]) = (u, *block);
+        let (x, y) = (block.x - self.ends[0].x, block.y - self.ends[0].y);
+        if self.first_pass < f64::INFINITY && x * x + y * y > self.apart {
+            (self.ends[1], self.apart) = (*block, x * x + y * y);
         }
     }
 

@@ -291,7 +291,7 @@ impl Tilt {
     }
 
     fn judge(&mut self) {
-        if let Err(fault) = trusted(&self.trace, self.fit.rejected) {
+        if let Err(fault) = trusted(&self.plan, &self.trace, self.fit.rejected) {
             self.report = counted(&self.trace, &self.fit);
             return self.leave(fault);
         }

@@ -35,6 +35,9 @@ const UNKNOWN_DEG: f64 = 90.0;
 /// Cosine within which a line is along an axis: 10°.
 const ALONG_AXIS: f64 = 0.985;
 
+/// Share by which the growth of the apparent depth may be another at another depth: the depth-load curve bends.
+const WEAR_BY_DEPTH: f64 = 0.1;
+
 /// What was found. Angles in °; uncertainties are expanded, k = 2.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -59,7 +62,7 @@ pub struct TiltReport {
     pub path_deg: f64,
     /// Depth at the middle of the path as the tool of its start would see it, mm; 0 when teaching.
     pub depth_mm: f64,
-    /// Load at the middle of the path: the row to be added when teaching.
+    /// Load at the middle of the first pass; when teaching, of the path at the start's wear: the row to be added.
     pub load: f64,
     /// Standard uncertainty of that load.
     pub load_std: f64,
@@ -67,7 +70,7 @@ pub struct TiltReport {
     pub wear_ratio_m: f64,
     /// Its uncertainty.
     pub wear_uncertainty_ratio_m: f64,
-    /// The published rule on the two ends of the path: depths, mm; 0 outside the table.
+    /// The published rule on the first pass, its start and the point farthest from it: depths, mm; 0 outside the table.
     pub two_point_depth_mm: [f64; 2],
     /// The published rule's tilt.
     pub two_point_deg: f64,
@@ -109,7 +112,7 @@ pub struct TiltReport {
 ///
 /// # Errors
 /// `GIB_ERR_TILT_…` with the count at fault and the count allowed.
-pub fn trusted(trace: &Trace, rejected: u32) -> Result<(), Fault> {
+pub fn trusted(plan: &Plan, trace: &Trace, rejected: u32) -> Result<(), Fault> {
     let Counts { off_condition, outside, aliased } = trace.counts;
     let used = trace.blocks().len() as u32;
     let at_most = |code, field, value: u32, high: u32| {
@@ -117,7 +120,9 @@ pub fn trusted(trace: &Trace, rejected: u32) -> Result<(), Fault> {
         if value > high { Err(Fault { code, field, value, low: 0.0, high }) } else { Ok(()) }
     };
     at_most(GIB_ERR_TILT_ALIAS, "speed_rpm\0", aliased, (used + aliased) / 3)?;
-    at_most(GIB_ERR_TILT_CONDITION, "off_condition\0", off_condition.saturating_sub(used / 3), used / 3)?;
+    if !plan.flag {
+        at_most(GIB_ERR_TILT_CONDITION, "off_condition\0", off_condition, (used + off_condition) / 3)?;
+    }
     at_most(GIB_ERR_TILT_RANGE, "load\0", outside, (used + outside) / 3)?;
     if trace.blocks().len() < FEWEST {
         let (value, low) = (f64::from(used), FEWEST as f64);
@@ -143,13 +148,12 @@ struct Slope {
 /// Reads the result of a fit; the decision with it.
 #[must_use]
 pub fn report(plan: &Plan, trace: &Trace, fit: &Fit) -> TiltReport {
-    let [c, s] = fit.along;
     let [near, far] = &fit.ends;
-    let place = |x: f64, y: f64| c * x + s * y;
-    let ends = [place(near.x, near.y), place(far.x, far.y)];
-    let length = ends[1] - ends[0];
-    let points = two_point(&plan.inverse, ends, [near.load, far.load]).unwrap_or_default();
-    let slope = if plan.two_point { by_points(fit, points.slope, length) } else { by_fit(fit) };
+    let (dx, dy) = (far.x - near.x, far.y - near.y);
+    let length = (dx * dx + dy * dy).sqrt();
+    let points = two_point(&plan.inverse, [0.0, length], [near.load, far.load]).unwrap_or_default();
+    let [c, s] = if plan.two_point && length > 0.0 { [dx / length, dy / length] } else { fit.along };
+    let slope = if plan.two_point { by_points(fit, [c, s], points.slope, length) } else { by_fit(fit) };
     let deg = |slope: f64| slope.atan().to_degrees();
     // d atan g = dg/(1 + g²), doubled for k = 2.
     let wide = |variance: f64, g: f64| 2.0 * (variance.max(0.0).sqrt() / (1.0 + g * g)).to_degrees();
@@ -157,19 +161,22 @@ pub fn report(plan: &Plan, trace: &Trace, fit: &Fit) -> TiltReport {
     let steep = (gx * gx + gy * gy).sqrt();
     let (p, q) = if steep > 0.0 { (gx / steep, gy / steep) } else { (c, s) };
     let along = p * p * slope.xx + 2.0 * p * q * slope.xy + q * q * slope.yy;
-    let across = q * q * slope.xx - 2.0 * p * q * slope.xy + p * p * slope.yy;
-    let scale = plan.inverse.scale_std(near.value.min(far.value), near.value.max(far.value));
-    let scaled = |g: f64| scale * scale * g * g;
-    let seen = seen(fit, plan.two_point);
+    let sideways = q * q * slope.xx - 2.0 * p * q * slope.xy + p * p * slope.yy;
+    let reach = fit.extent().map(|[low, high]| high - low);
+    let change = gx.abs() * reach[0] + gy.abs() * reach[1];
+    let depth = fit.at(fit.centre[0], fit.centre[1]);
+    let scale = plan.inverse.scale_std(depth - 0.5 * change, depth + 0.5 * change);
+    let worn = WEAR_BY_DEPTH * fit.beta[3] * fit.centre[2];
+    let scaled = |g: f64| (scale * scale + worn * worn) * g * g;
+    let seen = if fit.planar && !plan.two_point { GIB_TILT_ABOUT_X | GIB_TILT_ABOUT_Y } else { across([c, s]) };
     let uncertainty = |variance: f64, g: f64, axis: i32| {
         if seen & axis != 0 { wide(variance + scaled(g), g) } else { UNKNOWN_DEG }
     };
-    let middle = fit.centre;
     let gain = 0.5 * (near.gain + far.gain);
     let separated = fit.separable && !plan.two_point;
     let mut report = TiltReport {
         tilt_deg: deg(steep),
-        uncertainty_deg: wide(along.max(if steep > 0.0 { 0.0 } else { across }) + scaled(steep), steep),
+        uncertainty_deg: wide(along.max(if steep > 0.0 { 0.0 } else { sideways }) + scaled(steep), steep),
         about_x_deg: deg(gy),
         about_x_uncertainty_deg: uncertainty(slope.yy, gy, GIB_TILT_ABOUT_X),
         about_y_deg: -deg(gx),
@@ -177,7 +184,7 @@ pub fn report(plan: &Plan, trace: &Trace, fit: &Fit) -> TiltReport {
         slope_x_ratio: gx,
         slope_y_ratio: gy,
         path_deg: (s / c).atan().to_degrees(),
-        depth_mm: fit.at(middle[0], middle[1]),
+        depth_mm: depth,
         load: 0.5 * (near.load + far.load),
         load_std: fit.covariance[0][0].max(0.0).sqrt() * gain,
         wear_ratio_m: if separated { fit.beta[3] } else { 0.0 },
@@ -199,9 +206,7 @@ pub fn report(plan: &Plan, trace: &Trace, fit: &Fit) -> TiltReport {
         let told = seen & axis != 0 && value.abs() > uncertainty;
         report.axes |= if told { axis } else { 0 };
     }
-    let reach = fit.extent().map(|[low, high]| high - low);
-    let change = gain * (gx.abs() * reach[0] + gy.abs() * reach[1]);
-    report.decision = if report.tilt_deg <= plan.band_deg || change <= plan.band_load {
+    report.decision = if report.tilt_deg <= plan.band_deg || gain * change <= plan.band_load {
         GIB_TILT_IN_BAND
     } else if report.tilt_deg <= report.uncertainty_deg {
         GIB_TILT_NOT_SIGNIFICANT
@@ -237,12 +242,9 @@ pub fn counted(trace: &Trace, fit: &Fit) -> TiltReport {
     }
 }
 
-/// The axes that the path can tell.
-fn seen(fit: &Fit, two_point: bool) -> i32 {
-    let [c, s] = fit.along;
-    if fit.planar && !two_point {
-        GIB_TILT_ABOUT_X | GIB_TILT_ABOUT_Y
-    } else if c.abs() > ALONG_AXIS {
+/// The axis that a line in this direction can tell: the one across it.
+fn across([c, s]: [f64; 2]) -> i32 {
+    if c.abs() > ALONG_AXIS {
         GIB_TILT_ABOUT_Y
     } else if s.abs() > ALONG_AXIS {
         GIB_TILT_ABOUT_X
@@ -264,8 +266,7 @@ fn by_fit(fit: &Fit) -> Slope {
 }
 
 /// Two readings, each with the scatter of a block.
-fn by_points(fit: &Fit, slope: f64, length: f64) -> Slope {
-    let [c, s] = fit.along;
+fn by_points(fit: &Fit, [c, s]: [f64; 2], slope: f64, length: f64) -> Slope {
     let error = |gain: f64| fit.deviation / gain.max(1e-300) / length.max(1e-3);
     let variance =
         error(fit.ends[0].gain) * error(fit.ends[0].gain) + error(fit.ends[1].gain) * error(fit.ends[1].gain);
