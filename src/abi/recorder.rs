@@ -3,7 +3,7 @@
 use super::guard::{guarded, instance, instance_mut, placed, versioned};
 use super::shared_memory::SharedMemory;
 use super::types::GibErrorDetail;
-use crate::cycle::recorder::layout::Shape;
+use crate::cycle::recorder::layout::{HEAD, Shape};
 use crate::cycle::recorder::writer::{self, Plan, State};
 use crate::error::{
     Fault, GIB_BUSY, GIB_ERR_ABORTED, GIB_ERR_CONFIG, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_ERR_RECORDER_COUNT,
@@ -14,6 +14,8 @@ use core::ffi::{CStr, c_char, c_void};
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
 const ALIVE: u64 = 0x6769_625f_7265_0001;
+/// The mark while rows are written: one comparison says that the instance lives, records, and has its memory.
+const RECORDING: u64 = ALIVE + 1;
 
 /// What to record, under which name. Zero in a field means its default; fields marked "required" have none.
 #[repr(C)]
@@ -84,7 +86,7 @@ pub struct GibRecorder {
 
 impl super::guard::Instance for GibRecorder {
     fn alive(&self) -> bool {
-        self.alive == ALIVE
+        self.alive == ALIVE || self.alive == RECORDING
     }
     fn new() -> GibRecorder {
         GibRecorder {
@@ -114,7 +116,19 @@ impl GibRecorder {
         self.name.iter_mut().zip(wanted.name.bytes()).for_each(|(place, byte)| *place = byte);
         (self.plan, self.state) = (Plan::new(&shape), State::START);
         (self.memory, self.shape, self.status) = (Some(memory), Some(shape), GIB_BUSY);
+        self.alive = RECORDING;
         Ok(())
+    }
+
+    /// What a step returns that writes no row.
+    #[cold]
+    fn why_no_row(&self, no_values: bool) -> i32 {
+        match self.alive {
+            ALIVE => self.status,
+            RECORDING if no_values => GIB_ERR_NULL,
+            RECORDING => GIB_ERR_RECORDER_COUNT,
+            _ => GIB_ERR_HANDLE,
+        }
     }
 
     /// Ends and gives the shared memory back.
@@ -126,7 +140,7 @@ impl GibRecorder {
             ring::remove(&String::from_utf8_lossy(name));
             memory.unmap();
         }
-        (self.plan, self.status) = (Plan::REST, GIB_OK);
+        (self.plan, self.status, self.alive) = (Plan::REST, GIB_OK, ALIVE);
     }
 }
 
@@ -251,21 +265,17 @@ pub unsafe extern "C" fn gib_recorder_start(handle: *mut GibRecorder, config: *c
 pub unsafe extern "C" fn gib_recorder_step(handle: *mut GibRecorder, values: *const f64, count: u32) -> i32 {
     // SAFETY: the caller promises NULL or an instance.
     let Some(handle) = (unsafe { handle.as_mut() }) else { return GIB_ERR_NULL };
-    if handle.alive != ALIVE {
-        return GIB_ERR_HANDLE;
+    if handle.alive != RECORDING || count != handle.plan.channels || values.is_null() {
+        return handle.why_no_row(values.is_null());
     }
-    if handle.status != GIB_BUSY {
-        return handle.status;
-    }
-    if values.is_null() {
-        return GIB_ERR_NULL;
-    }
-    let (Some(memory), true) = (&handle.memory, count as usize == handle.plan.channels) else {
-        return GIB_ERR_RECORDER_COUNT;
-    };
+    // SAFETY: the mark is RECORDING only while there is a memory.
+    let memory = unsafe { handle.memory.as_ref().unwrap_unchecked() };
     // SAFETY: not NULL, and `count` readable numbers by the caller's promise.
     let values = unsafe { core::slice::from_raw_parts(values, count as usize) };
-    writer::step(&handle.plan, &mut handle.state, memory.words(), values);
+    // SAFETY: the plan is of the memory's own shape, so that each of its places has room for a row of `channels`.
+    let row = |place: usize, number: u64| unsafe { memory.put_row(place, number, values) };
+    // SAFETY: every mapping has a header.
+    writer::step(&handle.plan, &mut handle.state, row, |rows| unsafe { memory.release(HEAD, rows) });
     GIB_BUSY
 }
 
@@ -287,7 +297,7 @@ pub unsafe extern "C" fn gib_recorder_abort(handle: *mut GibRecorder) -> i32 {
         Ok(handle) => {
             if let (Some(memory), GIB_BUSY) = (&handle.memory, handle.status) {
                 writer::end(memory.words());
-                handle.status = GIB_ERR_ABORTED;
+                (handle.status, handle.alive) = (GIB_ERR_ABORTED, ALIVE);
             }
             GIB_OK
         }

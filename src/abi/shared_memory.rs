@@ -1,7 +1,7 @@
 //! Shared memory in this process' address space, as words that readers elsewhere may look at at any time.
 
 use crate::error::{Fault, GIB_ERR_MEMORY};
-use core::sync::atomic::AtomicU64;
+use core::sync::atomic::{AtomicU64, Ordering};
 use rustix::mm::{MapFlags, ProtFlags, mlock, mmap, munmap};
 use std::fs::File;
 use std::os::fd::{FromRawFd, IntoRawFd, RawFd};
@@ -42,6 +42,40 @@ impl SharedMemory {
     pub fn words(&self) -> &[AtomicU64] {
         // SAFETY: mapped from `map` until `unmap`, which takes self; pages are aligned; atomics may be shared.
         unsafe { core::slice::from_raw_parts(self.start, self.words) }
+    }
+
+    /// Writes a row: its number, then its values. For the cycle: without a check.
+    ///
+    /// # Safety
+    /// `place + 1 + values.len()` is not above the words of the mapping.
+    #[inline(always)]
+    pub unsafe fn put_row(&self, place: usize, number: u64, values: &[f64]) {
+        // SAFETY: inside the mapping by the caller's promise, which outlives the call and which this process never reads.
+        // Another process copies while this writes, and sees by the head which of what it has copied was whole.
+        unsafe {
+            let row = self.start.cast_mut().cast::<u64>().add(place);
+            row.write(number);
+            let mut cell = row.add(1).cast::<f64>();
+            let (fours, rest) = values.as_chunks::<4>();
+            for four in fours {
+                cell.cast::<[f64; 4]>().write(*four);
+                cell = cell.add(4);
+            }
+            for value in rest {
+                cell.write(*value);
+                cell = cell.add(1);
+            }
+        }
+    }
+
+    /// Stores a word so that whoever sees it sees all that was written before. For the cycle: without a check.
+    ///
+    /// # Safety
+    /// `at` is below the words of the mapping.
+    #[inline(always)]
+    pub unsafe fn release(&self, at: usize, value: u64) {
+        // SAFETY: inside the mapping by the caller's promise; atomics may be shared.
+        unsafe { &*self.start.add(at) }.store(value, Ordering::Release);
     }
 
     /// Takes the mapping away and closes the file.

@@ -4,14 +4,14 @@
 //! first of its words until after the last. A reader copies rows, then looks at the head again: of a head h every row
 //! from h − capacity + 1 on was whole while it was copied. The two fences make it hold on processors that reorder.
 
-use super::layout::{ENDED, HEAD, HEADER_WORDS, STATE, Shape};
+use super::layout::{ENDED, HEADER_WORDS, STATE, Shape};
 use core::sync::atomic::{AtomicU64, Ordering, fence};
 
 /// The constants of a cycle.
 #[derive(Debug, Clone, Copy)]
 pub struct Plan {
     /// Values in a row.
-    pub channels: usize,
+    pub channels: u32,
     row_words: usize,
     /// Words of header and ring.
     pub words: usize,
@@ -27,7 +27,7 @@ impl Plan {
     #[must_use]
     pub const fn new(shape: &Shape) -> Plan {
         Plan {
-            channels: shape.channels,
+            channels: shape.channels as u32,
             row_words: shape.row_words(),
             words: shape.words(),
             pause: shape.every.saturating_sub(1),
@@ -51,39 +51,22 @@ impl State {
     pub const START: State = State { rows: 0, place: HEADER_WORDS, wait: 0 };
 }
 
-/// One servo cycle: writes a row when one is due. `values` has one number a channel; `ring` is as long as the plan says.
+/// One servo cycle. When a row is due, `row` gets its first word's place and its number and writes it, then `head` gets the
+/// rows written so far and stores them with release.
 #[inline(always)]
-pub fn step(plan: &Plan, state: &mut State, ring: &[AtomicU64], values: &[f64]) {
+pub fn step(plan: &Plan, state: &mut State, row: impl FnOnce(usize, u64), head: impl FnOnce(u64)) {
     if state.wait > 0 {
         state.wait -= 1;
         return;
     }
     state.wait = plan.pause;
-    let end = state.place + plan.row_words;
-    let (Some(row), Some(head)) = (ring.get(state.place..end), ring.get(HEAD)) else { return };
-    let Some((number, cells)) = row.split_first() else { return };
-    // The head that the last cycle wrote is seen before any word of this row.
+    // The head that the last row wrote is seen before any word of this one, and this one before its head.
     fence(Ordering::Release);
-    number.store(state.rows, Ordering::Relaxed);
-    copy(cells, values);
+    row(state.place, state.rows);
     state.rows += 1;
+    let end = state.place + plan.row_words;
     state.place = if end < plan.words { end } else { HEADER_WORDS };
-    // And this row before its head.
-    head.store(state.rows, Ordering::Release);
-}
-
-/// Four at a time: the compiler does not unroll atomic stores by itself.
-#[inline(always)]
-fn copy(mut cells: &[AtomicU64], mut values: &[f64]) {
-    let put = |cell: &AtomicU64, value: f64| cell.store(value.to_bits(), Ordering::Relaxed);
-    while let ([a, b, c, d, cells_left @ ..], [p, q, r, s, values_left @ ..]) = (cells, values) {
-        put(a, *p);
-        put(b, *q);
-        put(c, *r);
-        put(d, *s);
-        (cells, values) = (cells_left, values_left);
-    }
-    cells.iter().zip(values).for_each(|(cell, value)| put(cell, *value));
+    head(state.rows);
 }
 
 /// Tells the readers that no row will come any more.
@@ -95,7 +78,19 @@ pub fn end(ring: &[AtomicU64]) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::layout::HEAD;
     use super::*;
+
+    /// One cycle into a ring in plain memory.
+    fn record(plan: &Plan, state: &mut State, ring: &[AtomicU64], values: &[f64]) {
+        let row = |place: usize, number: u64| {
+            ring[place].store(number, Ordering::Relaxed);
+            for (word, value) in ring[place + 1..].iter().zip(values) {
+                word.store(value.to_bits(), Ordering::Relaxed);
+            }
+        };
+        step(plan, state, row, |rows| ring[HEAD].store(rows, Ordering::Release));
+    }
 
     fn ring(shape: &Shape) -> Vec<AtomicU64> {
         let ring: Vec<AtomicU64> = (0..shape.words()).map(|_| AtomicU64::new(0)).collect();
@@ -110,7 +105,7 @@ mod tests {
             let (ring, plan, mut state) = (ring(&shape), Plan::new(&shape), State::START);
             for n in 0..40_u32 {
                 let values: Vec<f64> = (0..channels).map(|c| f64::from(100 * n + c)).collect();
-                step(&plan, &mut state, &ring, &values);
+                record(&plan, &mut state, &ring, &values);
             }
             assert_eq!(ring[HEAD].load(Ordering::Relaxed), 40);
             for n in 24..40_u32 {
@@ -128,7 +123,7 @@ mod tests {
     fn every_third_cycle() {
         let shape = Shape::new(1, 16, 3, 0.001).unwrap();
         let (ring, plan, mut state) = (ring(&shape), Plan::new(&shape), State::START);
-        (0..10).for_each(|n| step(&plan, &mut state, &ring, &[f64::from(n)]));
+        (0..10).for_each(|n| record(&plan, &mut state, &ring, &[f64::from(n)]));
         assert_eq!(state.rows, 4);
         let second = f64::from_bits(ring[HEADER_WORDS + 2 + 1].load(Ordering::Relaxed));
         assert_eq!(second, 3.0);
