@@ -217,7 +217,8 @@ fn add(chart: &mut Chart, series: &Series) -> Result<(), PlotError> {
         };
         if let (Some(annotation), true) = (annotation, i == last && !series.name.is_empty()) {
             let key = move |(x, y): (i32, i32)| Rectangle::new([(x + 2, y - 2), (x + 22, y + 2)], colour.filled());
-            annotation.label(series.name.as_str()).legend(key);
+            // plotters guesses a text's width, and too small where a font is wide: two spaces give the legend room.
+            annotation.label(format!("{}\u{a0}\u{a0}", series.name)).legend(key);
         }
     }
     Ok(())
