@@ -11,14 +11,14 @@ use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_OK};
 use core::ffi::c_void;
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
-const ALIVE: u64 = 0x6769_625f_686f_0001;
+const ALIVE: u32 = 0x6769_6821;
 /// The same for an instance that has nothing to do but to follow the axis.
-const QUIET: u64 = 0x6769_625f_686f_0002;
+const QUIET: u32 = 0x6769_6822;
 
 /// Homing of one axis, of one motor or two. Opaque; its size is `gib_homing_size()`.
 #[repr(C, align(16))]
 pub struct GibHoming {
-    alive: u64,
+    alive: u32,
     last: Fault,
     machine: Homing,
 }
@@ -168,33 +168,30 @@ pub unsafe extern "C" fn gib_homing_step(
     }
     // SAFETY: as above, and none is NULL.
     let (handle, input, output) = unsafe { (&mut *handle, &*input, &mut *output) };
-    // The cheap cycle, in which an axis spends its life. `x * 0` is NaN for NaN and infinity.
+    // The cheap cycles, in which an axis spends its life. `x * 0` is NaN for NaN and infinity.
     let [first, second] = input.position_mm;
-    if handle.alive == QUIET && !(first * 0.0 + second * 0.0).is_nan() {
-        *output = *handle.machine.rest_at(input.position_mm);
-        return handle.machine.output().status;
+    if handle.alive == QUIET && !((first + second) * 0.0).is_nan() {
+        *output = *handle.machine.output();
+        output.target_position_mm = input.position_mm;
+        return output.status;
     }
-    step(handle, input, output)
-}
-
-/// A cycle in which something is under way. `extern "C"`: it cannot unwind, so that it is called by a jump.
-#[inline(never)]
-extern "C" fn step(handle: &mut GibHoming, input: &HomingInput, output: &mut HomingOutput) -> i32 {
     if handle.alive == ALIVE && handle.machine.quick(input) {
         *output = *handle.machine.output();
-        return handle.machine.output().status;
+        return output.status;
     }
     step_in_full(handle, input, output)
 }
 
-/// Any cycle, or one of no living instance.
+/// Any cycle, or one of no living instance. `extern "C"`: it cannot unwind, so that it is called by a jump.
 #[inline(never)]
 extern "C" fn step_in_full(handle: &mut GibHoming, input: &HomingInput, output: &mut HomingOutput) -> i32 {
     if !handle.alive() {
         return misused(Some(handle), Some(input), Some(output));
     }
-    handle.machine.step(input);
-    handle.mark();
+    if !handle.machine.quick_slow(input) {
+        handle.machine.step(input);
+        handle.mark();
+    }
     *output = *handle.machine.output();
     output.status
 }

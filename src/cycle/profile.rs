@@ -53,6 +53,20 @@ impl Profile {
         self.goal - self.position
     }
 
+    /// The largest speed of the present move, mm per cycle.
+    #[inline(always)]
+    #[must_use]
+    pub fn speed_max(&self) -> f64 {
+        self.speed_max
+    }
+
+    /// How far from the goal braking may begin, mm.
+    #[inline(always)]
+    #[must_use]
+    pub fn braking(&self) -> f64 {
+        self.braking
+    }
+
     /// Whether the next cycle is one at constant speed, with the goal further than braking takes.
     #[inline(always)]
     #[must_use]
@@ -104,7 +118,8 @@ pub fn lower(a: f64, b: f64) -> f64 {
 
 /// The higher of two numbers, neither NaN.
 #[inline(always)]
-fn higher(a: f64, b: f64) -> f64 {
+#[must_use]
+pub fn higher(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 

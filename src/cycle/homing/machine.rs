@@ -59,7 +59,7 @@ enum Phase {
 pub struct Homing {
     plan: Plan,
     phase: Phase,
-    /// One motor moves and nothing else is to be done: most cycles are like the one before.
+    /// One motor moves or presses and nothing else is to be done: most cycles are like the one before.
     quick: bool,
     /// First fault of this run.
     fault: Fault,
@@ -176,13 +176,6 @@ impl Homing {
         !self.busy() && !self.changed && self.output.new_events == 0
     }
 
-    /// What a step puts out when all is [`Homing::quiet`]. `positions` must be finite.
-    #[inline(always)]
-    pub fn rest_at(&mut self, positions: [f64; 2]) -> &HomingOutput {
-        self.output.target_position_mm = positions;
-        &self.output
-    }
-
     /// What was found so far, and what became of it.
     #[must_use]
     pub fn report(&self) -> HomingReport {
@@ -214,7 +207,19 @@ impl Homing {
         done
     }
 
-    /// One servo cycle that is not [`Homing::quick`].
+    /// The same for a cycle that is not at constant speed.
+    #[inline(always)]
+    pub fn quick_slow(&mut self, input: &HomingInput) -> bool {
+        let [side, _] = &mut self.sides;
+        let done = input.flags == 0 && side.quick_slow(&self.plan, input.position_mm[0], input.torque[0]);
+        if done {
+            self.output.target_position_mm[0] = side.profile.position;
+            self.output.target_speed_mm_s[0] = side.profile.speed * self.plan.cycles_per_s;
+        }
+        done
+    }
+
+    /// One servo cycle that is neither [`Homing::quick`] nor [`Homing::quick_slow`].
     pub fn step(&mut self, input: &HomingInput) {
         self.now = self.cycles();
         self.sides[0].look_no_further();

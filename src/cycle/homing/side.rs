@@ -5,7 +5,7 @@
 
 use super::plan::{Plan, STUCK_BLOCKS};
 use super::trace::Trace;
-use crate::cycle::profile::{Profile, lower};
+use crate::cycle::profile::{Profile, higher, lower};
 use crate::error::*;
 
 /// Share of a new sample in the filtered torque: eight cycles.
@@ -40,13 +40,14 @@ pub struct Side {
     pub profile: Profile,
     /// Cycles for which the command surely goes on at its speed, far from any bound of way and time; the lag about
     /// which they count as usual, and by how much it may differ.
-    cruise: u32,
+    cruise: i32,
     granted: u32,
     usual_lag: f64,
     lag_band: f64,
-    /// Cycles for which a pressed motor may stand on before it is looked at again, and how far it may stray.
-    stand: u32,
-    stray: f64,
+    /// The same for a cycle that is not at constant speed, and the filtered torque within which it counts as usual.
+    slow: u32,
+    low: f64,
+    high: f64,
     /// Where homing began, mm.
     pub start: f64,
     /// Where the present touch began, mm.
@@ -203,94 +204,114 @@ impl Side {
     /// those of way and time are in `cruise`, those of lag and jump in `lag_band`.
     #[inline(always)]
     pub fn quick(&mut self, plan: &Plan, position: f64, torque: f64) -> bool {
-        if self.cruise == 0 {
-            return self.quick_stand(plan, position, torque);
-        }
         let filtered = (1.0 - GAIN) * self.filtered + plan.torque_share * torque;
         let lag = self.profile.position - position;
         // Written so that a NaN is not usual.
-        let usual = (lag - self.usual_lag).abs() <= self.lag_band
+        // Counted down first: that takes the fewest instructions.
+        self.cruise -= 1;
+        let usual = self.cruise >= 0
+            && (lag - self.usual_lag).abs() <= self.lag_band
             && position != self.position
             && filtered > plan.bound_below
             && filtered < self.trip;
         if !usual {
+            self.cruise += 1;
             return false;
         }
-        self.cruise -= 1;
-        self.filtered = filtered;
-        self.lowest = if filtered < self.lowest { filtered } else { self.lowest };
-        self.reading = torque;
-        self.position = position;
-        self.trace.add(position, torque);
+        self.take_in(position, torque, filtered);
         self.profile.cruise_on();
         true
     }
 
-    /// The same for a cycle of a pressed motor that stands: the command stands too, and nothing is traced.
+    /// The same where the command speeds up or brakes, the motor sticks, or it stands pressed.
     #[inline(always)]
-    fn quick_stand(&mut self, plan: &Plan, position: f64, torque: f64) -> bool {
+    pub fn quick_slow(&mut self, plan: &Plan, position: f64, torque: f64) -> bool {
         let filtered = (1.0 - GAIN) * self.filtered + plan.torque_share * torque;
-        let usual = self.stand != 0
-            && (position - self.anchor).abs() <= self.stray
-            && filtered > plan.release
-            && filtered < plan.bound;
+        let goes_on = if self.held {
+            (position - self.anchor).abs() <= plan.standing_way
+        } else {
+            (position != self.position) != (self.frozen > 0)
+        };
+        let usual = self.slow != 0
+            && self.safe(plan, position, torque)
+            && filtered > self.low
+            && filtered < self.high
+            && goes_on;
         if !usual {
             return false;
         }
-        self.stand -= 1;
-        self.filtered = filtered;
-        self.reading = torque;
-        self.position = position;
+        self.slow -= 1;
+        self.take_in(position, torque, filtered);
+        if !self.held || self.standing < plan.hold {
+            self.profile.step();
+        }
         true
     }
 
-    /// Cycles that went by in [`Side::quick`] since the last [`Side::look_ahead`].
+    #[inline(always)]
+    fn take_in(&mut self, position: f64, torque: f64, filtered: f64) {
+        self.filtered = filtered;
+        self.reading = torque;
+        self.position = position;
+        // A trace is kept of touches, the lowest torque of the way back.
+        if !self.trace.add(position, torque) {
+            self.lowest = lower(filtered, self.lowest);
+        }
+    }
+
+    /// Cycles that went by in [`Side::quick`] and [`Side::quick_slow`] since the last [`Side::look_ahead`].
     #[inline(always)]
     #[must_use]
     pub fn quick_cycles(&self) -> u32 {
-        self.granted - self.cruise - self.stand
+        self.granted - self.cruise as u32 - self.slow
     }
 
     /// Ends what [`Side::look_ahead`] has granted.
     #[inline(always)]
     pub fn look_no_further(&mut self) {
+        let gone = self.quick_cycles();
         if self.held {
-            self.standing += self.quick_cycles();
+            self.standing += gone;
+        } else if self.frozen > 0 {
+            self.frozen += gone;
         }
-        (self.cruise, self.stand, self.granted) = (0, 0, 0);
+        (self.cruise, self.slow, self.granted) = (0, 0, 0);
     }
 
-    /// Counts the cycles for which a pressed motor may stand on, at most `left`.
-    fn stand_on(&mut self, plan: &Plan, left: u32) {
-        // Within this way all bounds of [`Side::safe`] hold, and the motor stands.
-        let lag = (self.profile.position - self.anchor).abs();
-        let end = plan.distance[1] - plan.sense * (self.anchor - self.start);
-        self.stray = lower(lower(plan.standing_way, 0.5 * plan.jump), lower(plan.lag_limit - lag, end));
-        self.frozen = 0;
-        self.granted = plan.detection.saturating_sub(self.standing + 1).min(left);
-        self.stand = self.granted;
-    }
-
-    /// Counts the cycles for which [`Side::quick`] may go on, at most `left`; after a cycle's step of the command.
+    /// Counts the cycles for which [`Side::quick`] or [`Side::quick_slow`] may go on, at most `left`; after a cycle's
+    /// step of the command. The last of a move is left to the other steps.
     #[inline(always)]
     pub fn look_ahead(&mut self, plan: &Plan, left: u32) {
-        if self.held && self.standing >= plan.hold {
-            return self.stand_on(plan, left);
-        }
         let p = &self.profile;
-        if !p.cruises() || self.held || self.frozen > 0 {
+        let (way, speed) = (p.left().abs(), p.speed_max());
+        if p.cruises() && !self.held && self.frozen == 0 {
+            // The axis may lead its command by the largest lag.
+            let to_end = plan.distance[1] - plan.sense * (p.position - self.start);
+            let away = p.speed * plan.sense < 0.0;
+            let free = lower(way - p.braking() - 2.0 * speed, if away { way } else { to_end - plan.lag_limit });
+            // Between two lags of the band the position changes by no more than a jump, nor goes beyond the end.
+            self.usual_lag = p.position - p.speed - self.position;
+            let to_limit = lower(plan.lag_limit - self.usual_lag.abs(), plan.distance[1] - self.travel(plan));
+            self.lag_band = lower(0.5 * (plan.jump - speed), to_limit);
+            self.granted = ((free / speed) as u32).min(left).min(i32::MAX as u32);
+            self.cruise = self.granted as i32;
             return;
         }
-        // Between two lags of the band the position changes by no more than a jump.
-        self.usual_lag = p.position - p.speed - self.position;
-        self.lag_band = lower(0.5 * (plan.jump - p.speed.abs()), plan.lag_limit - self.usual_lag.abs());
-        // The command brakes over v·(v + a)/(2a), and the axis may lead it by the largest lag.
-        let (way, speed) = (p.left().abs(), p.speed.abs());
-        let braking = speed * (speed + plan.acceleration) / (2.0 * plan.acceleration) + 4.0 * speed;
-        let to_end = plan.distance[1] - plan.lag_limit - plan.sense * (p.position - self.start);
-        let free = if p.speed * plan.sense > 0.0 { lower(to_end, way - braking) } else { way - braking };
-        self.granted = ((free / speed) as u32).min(left);
-        self.cruise = self.granted;
+        (self.low, self.high) = (plan.bound_below, self.trip);
+        self.granted = ((way / speed - 4.0 - 2.0 * plan.acceleration / speed) as u32).min(left);
+        if self.held {
+            (self.low, self.high) = (plan.release, plan.bound);
+            self.frozen = 0;
+            let next = if self.standing < plan.hold { plan.hold } else { plan.detection };
+            self.granted = next.saturating_sub(self.standing + 1).min(left);
+        } else if self.frozen > 0 {
+            // Within this no encoder is at fault, see `rigid`.
+            let most = 0.5 * RIGID * plan.limit;
+            self.low = higher(self.low, self.free[1] - most);
+            self.high = lower(self.high, self.free[1] + most);
+            self.granted = self.granted.min(self.frozen_limit.saturating_sub(self.frozen));
+        }
+        self.slow = self.granted;
     }
 
     /// One cycle of a touch, after [`Side::sense`].
@@ -306,6 +327,7 @@ impl Side {
             self.held = false;
             self.pressing = false;
             self.trip = plan.threshold;
+            self.trace.resume();
         }
         self.trace.add(self.position, self.reading);
         if self.profile.step() { Touch::Arrived } else { Touch::Going }
@@ -331,6 +353,7 @@ impl Side {
         if !self.held {
             self.held = true;
             self.pressing = true;
+            self.trace.pause();
             self.trip = plan.release;
             self.anchor = self.position;
             self.standing = 0;

@@ -3,6 +3,9 @@
 /// Blocks that a trace holds; a power of two.
 pub const BLOCKS: usize = 2048;
 
+/// A block that never fills.
+const PAUSED: u32 = u32::MAX;
+
 /// Torque against way, oldest block first.
 #[derive(Debug, Clone)]
 pub struct Trace {
@@ -11,7 +14,7 @@ pub struct Trace {
     /// Share of a sample in its block's mean.
     share: f64,
     length: u32,
-    /// Cycles after which a block is full: `length`, or never while paused.
+    /// Cycles after which a block is full: `length`, or `PAUSED`.
     full: u32,
     in_block: u32,
     position: f64,
@@ -29,7 +32,7 @@ impl Default for Trace {
             written: 0,
             share: 1.0,
             length: 1,
-            full: u32::MAX,
+            full: PAUSED,
             in_block: 0,
             position: 0.0,
             torque: 0.0,
@@ -55,17 +58,29 @@ impl Trace {
         self.torque = 0.0;
     }
 
-    /// Keeps what is there until the next start, whatever is added.
+    /// Keeps what is there until the next start or `resume`, whatever is added.
     pub fn pause(&mut self) {
-        self.full = u32::MAX;
+        self.full = PAUSED;
         self.in_block = 0;
     }
 
-    /// Adds the position (mm) and torque of a cycle, as they were read.
+    /// Goes on after a pause, with a new block.
+    pub fn resume(&mut self) {
+        self.full = self.length;
+        self.in_block = 0;
+        self.position = 0.0;
+        self.torque = 0.0;
+    }
+
+    /// Adds the position (mm) and torque of a cycle, as they were read; false when paused.
     #[inline(always)]
-    pub fn add(&mut self, position: f64, torque: f64) {
+    pub fn add(&mut self, position: f64, torque: f64) -> bool {
         if self.full == 1 {
-            return self.put(position, torque);
+            self.put(position, torque);
+            return true;
+        }
+        if self.full == PAUSED {
+            return false;
         }
         self.position += position;
         self.torque += torque;
@@ -76,6 +91,7 @@ impl Trace {
             self.position = 0.0;
             self.torque = 0.0;
         }
+        true
     }
 
     #[inline(always)]
@@ -139,15 +155,18 @@ mod tests {
     fn blocks_are_means_and_the_oldest_goes_first() {
         let mut trace = Trace::default();
         trace.start(2, 0.0, 1.0, 1.0);
-        (0..7).for_each(|i| trace.add(f64::from(i), 1.0));
+        (0..7).for_each(|i| assert!(trace.add(f64::from(i), 1.0)));
         assert_eq!((trace.len(), trace.block(0), trace.block(2)), (3, (0.5, 1.0), (4.5, 1.0)));
         trace.start(1, 5.0, -1.0, -1.0);
-        (0..BLOCKS + 3).for_each(|i| trace.add(5.0 - i as f64, -1.0));
+        (0..BLOCKS + 3).for_each(|i| assert!(trace.add(5.0 - i as f64, -1.0)));
         assert_eq!((trace.len(), trace.block(0)), (BLOCKS as u32, (3.0, 1.0)));
         assert_eq!(trace.block(BLOCKS as u32 - 1), ((BLOCKS + 2) as f64, 1.0));
         assert!(trace.stuck(100) && !Trace::default().stuck(100));
         trace.pause();
-        (0..10).for_each(|_| trace.add(0.0, 1.0));
-        assert_eq!(trace.block(BLOCKS as u32 - 1), ((BLOCKS + 2) as f64, 1.0));
+        (0..10).for_each(|_| assert!(!trace.add(0.0, 1.0)));
+        assert_eq!(trace.last_way(), (BLOCKS + 2) as f64);
+        trace.resume();
+        assert!(trace.add(0.0, 1.0));
+        assert_eq!(trace.last_way(), 5.0);
     }
 }
