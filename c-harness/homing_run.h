@@ -26,6 +26,7 @@ typedef struct {
     int events;
     double home_error_um;     /* machine coordinate of the contact point of motor 1, as the kernel would show it */
     gib_homing_report report;
+    gib_error_detail detail;
 } homing_outcome;
 
 static inline gib_homing_config homing_config(const homing_plant_config *c)
@@ -97,6 +98,7 @@ static inline homing_outcome homing_run(const homing_plant_config *c, const gib_
     o.most_torque_nm = p.most_torque_nm;
     o.most_travel_mm = p.most_travel_mm;
     gib_homing_result(gib, &o.report);
+    gib_homing_last_error(gib, &o.detail);
     /* Half a second to swing out, then a second of rest. */
     double from = 0.0;
     for (int i = 0; i < 1500; i++) {
@@ -110,8 +112,9 @@ static inline homing_outcome homing_run(const homing_plant_config *c, const gib_
         }
     }
     o.limit_nm = p.limit_nm;
-    /* The motor leads the table by half the clearance and the wind-up of the table's friction. */
-    double lead = 0.5 * c->clearance_mm + (1.0 - c->motor_share) * c->friction_nm / c->stiffness_nm_mm;
+    /* The motor leads the table by half the clearance and the wind-up of what the table takes to slide. */
+    double slides = (1.0 - c->motor_share) * c->friction_nm + c->constant_nm;
+    double lead = copysign(0.5 * c->clearance_mm, slides) + slides / c->stiffness_nm_mm;
     double contact = c->sense * (c->stop_mm[0] + lead);
     double wanted = g->set_position_mm + c->sense * g->zero_offset_mm;
     o.home_error_um = 1e3 * c->sense * (contact + p.shift_mm[0] - wanted);

@@ -198,6 +198,12 @@ impl Plan {
         (self.window() / (TRACE_BLOCKS * speed)).ceil() as u32
     }
 
+    /// Speed of the way back, mm per cycle: as gentle as a touch, and half of it is gone at a steady speed.
+    #[must_use]
+    pub fn back(&self) -> f64 {
+        self.touch.min((0.5 * self.acceleration * self.retract).sqrt())
+    }
+
     /// Cycles that the encoder may stand while the command goes on at `speed` (mm per cycle) and no limit is reached: a
     /// tenth of the retraction, far more than friction or a grid explain.
     #[must_use]

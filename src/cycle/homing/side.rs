@@ -58,8 +58,9 @@ pub struct Side {
     pub position: f64,
     /// Torque toward the stop, filtered.
     pub filtered: f64,
-    /// Lowest of it on the way back.
-    pub lowest: f64,
+    /// Lowest of it on the way back, and the last while it slid back steadily.
+    lowest: f64,
+    sliding: f64,
     /// The torque as it was read last.
     reading: f64,
     /// Cycles since the position changed, how many are too many, and the torque when it last changed.
@@ -378,6 +379,7 @@ impl Side {
         self.trip = plan.bound;
         self.held = false;
         self.lowest = self.filtered;
+        self.sliding = f64::NEG_INFINITY;
         self.from = self.position;
         self.frozen = 0;
         self.free = [self.reading, self.filtered];
@@ -390,6 +392,9 @@ impl Side {
         self.lowest = lower(self.lowest, self.filtered);
         if self.frozen > 0 && self.profile.speed != 0.0 && self.rigid(plan) {
             return Touch::Broken;
+        }
+        if self.profile.cruises() {
+            self.sliding = self.filtered;
         }
         if self.profile.step() { Touch::Arrived } else { Touch::Going }
     }
@@ -410,12 +415,15 @@ impl Side {
         (self.profile.position - self.position).abs() <= 0.1 * plan.press_max
     }
 
-    /// Whether the axis was held on its way back as it was on its way in. `level`: torque before contact.
+    /// Whether the axis was held where its way back began as it was on its way in: a tight spot takes as much torque
+    /// above what sliding takes both ways, or does not let go at all. `level`: torque before contact. Nothing is said of
+    /// a way back too short to slide steadily.
     #[must_use]
     pub fn held_back(&self, plan: &Plan, level: f64) -> Option<Fault> {
-        let (back, high) = (-self.lowest - level, 0.5 * (plan.threshold - level));
-        let fault = Fault { code: GIB_ERR_HOMING_TIGHT_SPOT, field: "torque\0", value: back, low: 0.0, high };
-        (back > high).then_some(fault)
+        let (above, high) = (self.sliding - self.lowest, 0.5 * (plan.threshold - level));
+        let stayed = plan.sense * (self.position - self.profile.position) > 0.5 * plan.retract;
+        let fault = Fault { code: GIB_ERR_HOMING_TIGHT_SPOT, field: "torque\0", value: -self.lowest, low: 0.0, high };
+        (above > high || stayed).then_some(fault)
     }
 
     /// Whether something is pressed on.

@@ -283,7 +283,7 @@ impl Homing {
         if self.touch < plan.touches {
             let mut bound = 0f64;
             for side in self.sides.iter_mut().take(plan.motors) {
-                bound = bound.max(side.go(&plan, side.position - plan.sense * plan.retract, plan.approach));
+                bound = bound.max(side.go(&plan, side.position - plan.sense * plan.retract, plan.back()));
             }
             return self.enter(Phase::Retract, bound);
         }
