@@ -64,6 +64,31 @@ void homing_plant_init(homing_plant *p, const homing_plant_config *c)
     }
 }
 
+void homing_plant_break(homing_plant *p, homing_fault fault)
+{
+    p->fault = fault;
+    for (int i = 0; i < p->c.motors; i++) {
+        homing_plant_side *s = &p->side[i];
+        if (fault == FAULT_STOP_GONE) {
+            p->c.stop_mm[i] += 1e6;
+        } else if (fault == FAULT_TORQUE_STUCK_HIGH) {
+            p->side[i].stuck_at = 4.9;
+        } else if (fault == FAULT_STOP_EARLY && s->y < p->c.stop_mm[i]) {
+            p->c.stop_mm[i] = fmin(p->c.stop_mm[i], s->y + 0.1);
+        }
+    }
+    switch (fault) {
+    case FAULT_TIGHT_SPOT:
+        p->c.tight_mm = p->side[0].y;
+        p->c.tight_nm = 8.0;
+        p->c.tight_width_mm = 0.2;
+        break;
+    case FAULT_STOP_SOFT: p->c.stop_stiffness_nm_mm = 4.0; break;
+    case FAULT_TORQUE_NOISY: p->c.torque_noise_nm = 1.5; break;
+    default: break;
+    }
+}
+
 static double deadzone(double wound, double clearance)
 {
     double half = 0.5 * clearance;
@@ -160,16 +185,34 @@ static double encoder(homing_plant *p, homing_plant_side *s)
 static double torque_reading(homing_plant *p, homing_plant_side *s)
 {
     double t = s->torque + p->c.torque_noise_nm * normal(&p->random);
-    if (p->fault == FAULT_TORQUE_STUCK || p->fault == FAULT_TORQUE_STUCK_HIGH) {
-        return p->fault == FAULT_TORQUE_STUCK ? s->stuck_at : p->in.torque_limit * 0.98;
+    switch (p->fault) {
+    case FAULT_TORQUE_STUCK:
+    case FAULT_TORQUE_STUCK_HIGH: return s->stuck_at;
+    case FAULT_TORQUE_NAN: return NAN;
+    case FAULT_TORQUE_PLUS_INF: return INFINITY;
+    case FAULT_TORQUE_MINUS_INF: return -INFINITY;
+    case FAULT_TORQUE_INVERTED: return -t;
+    default: s->stuck_at = t; return t;
     }
-    s->stuck_at = t;
-    return p->fault == FAULT_TORQUE_NAN ? NAN : p->fault == FAULT_TORQUE_INVERTED ? -t : t;
+}
+
+static uint32_t flags(homing_fault fault)
+{
+    switch (fault) {
+    case FAULT_DRIVE_TRIP: return GIB_INPUT_FAULT;
+    case FAULT_ABORT: return GIB_INPUT_ABORT;
+    case FAULT_FLAG_UNKNOWN: return 1u << 20;
+    default: return 0u;
+    }
 }
 
 static void serve_requests(homing_plant *p)
 {
     if (p->out.request_id == p->done_id || p->fault == FAULT_NO_ACKNOWLEDGEMENT) {
+        p->waited = 0;
+        return;
+    }
+    if (p->waited++ < p->c.answer_cycles) {
         return;
     }
     if (p->out.requests & GIB_HOMING_REQUEST_TORQUE_LIMIT) {
@@ -197,12 +240,19 @@ const gib_homing_input *homing_plant_cycle(homing_plant *p)
         p->in.torque_limit = p->limit_nm;
     }
     serve_requests(p);
+    if (p->fault == FAULT_CHIPS && c->chips_mm == 0.0 && p->side[0].y < c->stop_mm[0] - 0.35) {
+        p->c.chips_mm = 0.3;
+        p->c.chips_stiffness_nm_mm = 60.0;
+        p->c.chips_crush_mm = 0.2;
+    }
     for (int i = 0; i < c->motors; i++) {
         homing_plant_side *s = &p->side[i];
         double x = encoder(p, s);
-        p->in.position_mm[i] = c->sense * (p->fault == FAULT_ENCODER_NAN ? NAN : x);
+        double told = p->fault == FAULT_ENCODER_NAN ? NAN : p->fault == FAULT_ENCODER_INF ? INFINITY : x;
+        p->in.position_mm[i] = c->sense * told;
         p->in.torque[i] = c->sense * torque_reading(p, s);
-        double target = p->out.owns_motion ? c->sense * p->out.target_position_mm[i] : s->last_target;
+        int follows = p->out.owns_motion && p->fault != FAULT_NOT_FOLLOWED;
+        double target = follows ? c->sense * p->out.target_position_mm[i] : s->last_target;
         if (p->first_cycle || (p->owned && !p->out.owns_motion)) {
             s->last_encoder = p->first_cycle ? x : s->last_encoder;
             s->last_target = target = x; /* the kernel takes over where the axis is */
@@ -219,7 +269,10 @@ const gib_homing_input *homing_plant_cycle(homing_plant *p)
         p->most_travel_mm = fmax(p->most_travel_mm, s->y);
     }
     p->in.acknowledged_id = p->done_id;
-    p->in.flags = p->fault == FAULT_DRIVE_TRIP ? GIB_INPUT_FAULT : p->fault == FAULT_ABORT ? GIB_INPUT_ABORT : 0u;
+    if (p->fault == FAULT_LIMIT_NAN) {
+        p->in.torque_limit = NAN;
+    }
+    p->in.flags = flags(p->fault);
     p->first_cycle = 0;
     p->owned = p->out.owns_motion;
     p->time_s += c->cycle_s;

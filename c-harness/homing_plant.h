@@ -29,24 +29,38 @@ typedef struct {
     double position_gain_1_s, velocity_gain_nm_s_mm, velocity_integral_time_s, velocity_feedforward;
     double torque_time_constant_s, torque_limit_nm;                /* the drive's own limit */
     double encoder_mm, torque_noise_nm;
+    int answer_cycles; /* that the kernel takes to carry a request out */
     uint64_t seed;
 } homing_plant_config;
 
-/* What may go wrong. */
+/* What may go wrong, from some cycle on. */
 typedef enum {
     FAULT_NONE,
+    FAULT_ABORT,
+    FAULT_DRIVE_TRIP, /* as after a following error */
+    FAULT_FLAG_UNKNOWN,
+    FAULT_TORQUE_NAN,
+    FAULT_TORQUE_PLUS_INF,
+    FAULT_TORQUE_MINUS_INF,
+    FAULT_ENCODER_NAN,
+    FAULT_ENCODER_INF,
+    FAULT_LIMIT_NAN, /* of the limit in force, as the kernel tells it */
     FAULT_TORQUE_STUCK,
     FAULT_TORQUE_STUCK_HIGH,
     FAULT_TORQUE_INVERTED,
-    FAULT_TORQUE_NAN,
+    FAULT_TORQUE_NOISY,
     FAULT_ENCODER_FROZEN,
-    FAULT_ENCODER_SLIPS, /* a little in every cycle */
+    FAULT_ENCODER_SLIPS, /* a little in every cycle on the way to the stop */
     FAULT_ENCODER_JUMPS,
-    FAULT_ENCODER_NAN,
-    FAULT_NO_ACKNOWLEDGEMENT,
-    FAULT_LIMIT_IGNORED, /* acknowledged, but the drive does not limit */
-    FAULT_DRIVE_TRIP,
-    FAULT_ABORT
+    FAULT_NO_ACKNOWLEDGEMENT, /* and nothing carried out */
+    FAULT_LIMIT_IGNORED,      /* acknowledged, but the drive does not limit */
+    FAULT_NOT_FOLLOWED,       /* the kernel no longer passes the command on */
+    FAULT_TIGHT_SPOT,         /* that holds the axis where it is */
+    FAULT_STOP_GONE,
+    FAULT_STOP_SOFT,
+    FAULT_STOP_EARLY, /* something solid close before the axis */
+    FAULT_CHIPS,      /* once the axis is away from the stop */
+    FAULTS
 } homing_fault;
 
 typedef struct {
@@ -63,6 +77,7 @@ typedef struct {
     /* the kernel */
     double limit_nm;
     uint32_t done_id;
+    int waited;
     double shift_mm[2];
     gib_homing_output out;
     gib_homing_input in;
@@ -75,6 +90,8 @@ typedef struct {
 
 homing_plant_config homing_plant_default(void);
 void homing_plant_init(homing_plant *p, const homing_plant_config *c);
+/* From now on `fault` is there. */
+void homing_plant_break(homing_plant *p, homing_fault fault);
 /* The axis moves for one cycle as gib asked for in `out`, and the kernel carries out requests; fills `in`. */
 const gib_homing_input *homing_plant_cycle(homing_plant *p);
 /* Uniform in [0, 1). */

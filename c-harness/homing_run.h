@@ -1,6 +1,5 @@
 /*
- * Runs one homing on a plant from start to end, with a fault injected at a chosen moment, and watches that torque and
- * motion stay within bounds and come to rest.
+ * Runs one homing on a plant from start to end, and watches that torque and motion stay within bounds and come to rest.
  */
 #ifndef HOMING_RUN_H
 #define HOMING_RUN_H
@@ -10,13 +9,9 @@
 #include <math.h>
 #include <string.h>
 
-/* Moments at which a fault is injected. */
-typedef enum { AT_LIMIT, AT_APPROACH, AT_PRESS, AT_RETRACT, AT_TOUCH, AT_CLEAR, AT_EVALUATE, AT_OFFSET, AT_SET, MOMENTS } moment;
-
 typedef struct {
     int32_t status;
     int cycles;               /* of the whole homing */
-    int reaction;             /* cycles from the fault to the end of homing */
     double most_torque_nm;    /* of the real motor */
     double most_travel_mm;    /* of the real table */
     double rest_torque_nm;    /* largest motor torque in a second after the end */
@@ -43,31 +38,11 @@ static inline gib_homing_config homing_config(const homing_plant_config *c)
     return g;
 }
 
-/* Whether the homing is at the moment now. */
-static inline int homing_is_at(const gib_homing_output *o, moment m, int in_phase, int touches)
-{
-    switch (m) {
-    case AT_LIMIT: return o->phase == GIB_HOMING_LIMIT && o->request_id != 0;
-    case AT_APPROACH: return o->phase == GIB_HOMING_TOUCH && touches == 1 && in_phase > 1500;
-    case AT_PRESS: return o->phase == GIB_HOMING_TOUCH && (o->events & GIB_HOMING_EVENT_CONTACT) && in_phase > 20;
-    case AT_RETRACT: return o->phase == GIB_HOMING_RETRACT && in_phase > 500;
-    case AT_TOUCH: return o->phase == GIB_HOMING_TOUCH && touches == 2 && in_phase > 700;
-    case AT_CLEAR: return o->phase == GIB_HOMING_CLEAR;
-    case AT_EVALUATE: return o->phase == GIB_HOMING_EVALUATE && in_phase > 20;
-    case AT_OFFSET: return o->phase == GIB_HOMING_OFFSET && in_phase > 500;
-    case AT_SET: return o->phase == GIB_HOMING_SET;
-    default: return 0;
-    }
-}
-
-/* `truth_mm`: where motor 1 is at contact, toward the stop. */
-static inline homing_outcome homing_run(const homing_plant_config *c, const gib_homing_config *g, moment m,
-                                        homing_fault fault)
+static inline homing_outcome homing_run(const homing_plant_config *c, const gib_homing_config *g)
 {
     static homing_plant p;
     homing_outcome o;
     int32_t status;
-    int phase = -1, in_phase = 0, touches = 0, injected = 0;
     memset(&o, 0, sizeof o);
     homing_plant_init(&p, c);
     gib_homing *gib = gib_homing_new();
@@ -80,21 +55,13 @@ static inline homing_outcome homing_run(const homing_plant_config *c, const gib_
         const gib_homing_input *in = homing_plant_cycle(&p);
         status = gib_homing_step(gib, in, &p.out);
         o.cycles++;
-        in_phase = p.out.phase == phase ? in_phase + 1 : 0;
-        touches += p.out.phase == GIB_HOMING_TOUCH && phase != GIB_HOMING_TOUCH;
-        phase = p.out.phase;
         for (uint32_t bit = 1; bit != 0; bit <<= 1) {
             if ((p.out.new_events & bit) && o.events < 16) {
                 o.order[o.events++] = bit;
             }
         }
-        if (!injected && fault != FAULT_NONE && homing_is_at(&p.out, m, in_phase, touches)) {
-            injected = o.cycles;
-            p.fault = fault;
-        }
     } while (status == GIB_BUSY && o.cycles < 2000000);
     o.status = status;
-    o.reaction = injected ? o.cycles - injected : 0;
     o.most_torque_nm = p.most_torque_nm;
     o.most_travel_mm = p.most_travel_mm;
     gib_homing_result(gib, &o.report);

@@ -15,7 +15,7 @@ static homing_outcome usual(double sense, uint64_t seed)
     c.seed = seed;
     gib_homing_config g = homing_config(&c);
     g.set_position_mm = 12.5;
-    return homing_run(&c, &g, AT_LIMIT, FAULT_NONE);
+    return homing_run(&c, &g);
 }
 
 /* Either direction: homed, every event once and in order, the old torque limit back, within the uncertainty told. */
@@ -50,7 +50,7 @@ static void home_depends_on_neither_limit_nor_stiffness(void **state)
             c.torque_noise_nm = 0.03 * limit[k];
             gib_homing_config g = homing_config(&c);
             g.torque_limit_nm = limit[k];
-            homing_outcome o = homing_run(&c, &g, AT_LIMIT, FAULT_NONE);
+            homing_outcome o = homing_run(&c, &g);
             assert_int_equal(o.status, GIB_DONE);
             line[k] += 1e3 * o.report.side[0].contact_mm / 8;
             threshold[k] += 1e3 * o.report.side[0].threshold_mm / 8;
@@ -68,7 +68,7 @@ static void units_and_polarity(void **state)
     gib_homing_config g = homing_config(&c);
     g.position_unit = GIB_POSITION_DEG;
     g.lag_reduction = GIB_HOMING_INSTANT_LAG_REDUCTION;
-    homing_outcome o = homing_run(&c, &g, AT_LIMIT, FAULT_NONE);
+    homing_outcome o = homing_run(&c, &g);
     assert_int_equal(o.status, GIB_DONE);
     assert_int_equal(o.events, 6); /* none asked, none acknowledged */
 }
@@ -82,12 +82,12 @@ static void gantry(void **state)
     c.beam_nm_mm = 20.0;
     c.stop_mm[1] = 6.05;
     gib_homing_config g = homing_config(&c);
-    homing_outcome o = homing_run(&c, &g, AT_LIMIT, FAULT_NONE);
+    homing_outcome o = homing_run(&c, &g);
     assert_int_equal(o.status, GIB_DONE);
     assert_true(fabs(o.report.skew_mm + 0.05) < 0.02);
     c.beam_nm_mm = 2.0; /* stiffer, and the beam alone would hold the other side */
     c.stop_mm[1] = 6.5;
-    o = homing_run(&c, &g, AT_LIMIT, FAULT_NONE);
+    o = homing_run(&c, &g);
     assert_int_equal(o.status, GIB_ERR_HOMING_SQUARE);
 }
 
@@ -124,20 +124,6 @@ static void refuses_what_it_cannot_do(void **state)
     gib_homing_free(gib);
 }
 
-/* Aborted at any moment it ends at rest with the old limit back. */
-static void abort_at_every_moment(void **state)
-{
-    (void)state;
-    homing_plant_config c = homing_plant_default();
-    gib_homing_config g = homing_config(&c);
-    for (int m = 0; m < MOMENTS; m++) {
-        homing_outcome o = homing_run(&c, &g, (moment)m, FAULT_ABORT);
-        assert_int_equal(o.status, GIB_ERR_ABORTED);
-        assert_true(o.reaction < 1000 && o.limit_nm == c.torque_limit_nm);
-        assert_true(o.rest_way_mm < 0.005 && o.rest_torque_nm < 1.5 * c.friction_nm);
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -146,7 +132,6 @@ int main(void)
         cmocka_unit_test(units_and_polarity),
         cmocka_unit_test(gantry),
         cmocka_unit_test(refuses_what_it_cannot_do),
-        cmocka_unit_test(abort_at_every_moment),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,6 +2,7 @@
  * Every family's step in real time: a million cycles without a system call, an allocation, a subnormal or a number that
  * is not finite; and each of these gates catches a fault put in on purpose.
  */
+#include "homing_plant.h"
 #include "kernel.h"
 #include "lathe_run.h"
 #include "realtime.h"
@@ -76,6 +77,75 @@ static int32_t backlash_cycle(void)
         gib_backlash_start(backlash.gib, &backlash.config);
     }
     return out->phase;
+}
+
+/* Homing: one after the other, of one motor and of two, some of them aborted, faulted or fed with NaN on the way. */
+static struct {
+    homing_plant axis;
+    gib_homing *gib;
+    uint64_t run, cycle_of_run, waits;
+    double outputs[7];
+} homing;
+
+static void homing_begin(void)
+{
+    homing_plant_config c = homing_plant_default();
+    c.substeps = 8;
+    c.answer_cycles = 3;
+    c.stop_mm[0] = c.stop_mm[1] = 1.2;
+    c.motors = homing.run % 5 == 4 ? 2 : 1;
+    c.sense = homing.run % 2 ? -1.0 : 1.0;
+    c.beam_nm_mm = c.motors == 2 ? 20.0 : 0.0;
+    gib_homing_output out = homing.axis.out;
+    homing_plant_init(&homing.axis, &c);
+    homing.axis.out = out;
+    homing.axis.done_id = out.request_id;
+    gib_homing_config config = {.struct_size = sizeof config,
+                                .direction = homing.run % 2 ? -1 : 1,
+                                .motors = c.motors,
+                                .cycle_s = c.cycle_s,
+                                .torque_limit_nm = 5.0,
+                                .distance_max_mm = 2.5,
+                                .touches = 1,
+                                .retract_mm = 0.5,
+                                .zero_offset_mm = 0.3};
+    homing.waits = homing.cycle_of_run = 0;
+    gib_homing_start(homing.gib, &config);
+}
+
+static void homing_prepare(void)
+{
+    memset(&homing, 0, sizeof homing);
+    homing_plant_config c = homing_plant_default();
+    homing_plant_init(&homing.axis, &c);
+    homing.gib = gib_homing_new();
+}
+
+static int32_t homing_cycle(void)
+{
+    gib_homing_input in = *homing_plant_cycle(&homing.axis);
+    uint64_t kind = homing.run % 7, at = 200 + 197 * (homing.run % 31);
+    if (kind >= 4 && homing.cycle_of_run == at) {
+        if (kind == 4) {
+            in.flags = GIB_INPUT_ABORT;
+        } else if (kind == 5) {
+            in.flags = GIB_INPUT_FAULT;
+        } else {
+            in.torque[0] = 0.0 / 0.0;
+        }
+    }
+    homing.cycle_of_run++;
+    gib_homing_output *out = &homing.axis.out;
+    int32_t status = gib_homing_step(homing.gib, &in, out);
+    double numbers[] = {out->target_position_mm[0], out->target_position_mm[1], out->target_speed_mm_s[0],
+                        out->target_speed_mm_s[1], out->shift_mm[0], out->shift_mm[1], out->torque_limit};
+    memcpy(homing.outputs, numbers, sizeof numbers);
+    int32_t phase = out->phase;
+    if (status != GIB_BUSY && ++homing.waits > 100) {
+        homing.run++;
+        homing_begin();
+    }
+    return phase;
 }
 
 /* Recorder: rows on and on, some of them refused, and one ring after the other ended. */
@@ -398,6 +468,7 @@ static const struct {
     uint32_t phases;
 } FAMILIES[] = {
     {{"backlash", backlash_prepare, backlash_cycle, backlash.outputs, 5}, (1u << (GIB_BACKLASH_FAILED + 1)) - 1u},
+    {{"homing", homing_prepare, homing_cycle, homing.outputs, 7}, (1u << (GIB_HOMING_FAILED + 1)) - 1u},
     {{"recorder", recorder_prepare, recorder_cycle, recorder.outputs, 12}, 1u << 1 | 1u << 2 | 1u << 3},
     {{"inertia", inertia_prepare, inertia_cycle, inertia.outputs, 2}, (1u << (GIB_INERTIA_FAILED + 1)) - 1u},
     {{"speed_variation", variation_prepare, variation_cycle, variation.outputs, 5},

@@ -174,7 +174,7 @@ impl Fit {
         let (slope, about) = early.line();
         let error = (about / (early.n - 2.0).max(1.0) / early.spread().0).sqrt();
         let pace = (self.threshold - early.t / early.n) / self.window;
-        early.n >= FEWEST && slope > 5.0 * error && slope > 0.5 * pace
+        early.n >= FEWEST && slope > 3.0 * error && slope > 0.5 * pace
     }
 
     /// One slice; true when ready.

@@ -211,6 +211,12 @@ impl Plan {
         (0.1 * self.retract / speed).max(20.0) as u32
     }
 
+    /// Cycles that the axis may take to come to where its command has ended.
+    #[must_use]
+    pub fn settling(&self) -> f64 {
+        4.0 * f64::from(self.detection)
+    }
+
     /// Furthest that the command goes toward the stop: short of the largest distance by what a servo overshoots.
     #[must_use]
     pub fn reach(&self) -> f64 {

@@ -100,16 +100,17 @@ impl Trace {
         self.written = self.written.wrapping_add(1);
     }
 
-    /// Standard deviation of one sample about its neighbours, over the last 32 blocks.
+    /// Standard deviation of one sample about the line through its neighbours, over the last 32 blocks.
     #[must_use]
     pub fn noise(&self) -> f64 {
         const LAST: u32 = 32;
         let (to, mut squares) = (self.len(), 0.0);
-        for i in to.saturating_sub(LAST) + 1..to {
-            let step = self.block(i).1 - self.block(i - 1).1;
-            squares += step * step;
+        for i in to.saturating_sub(LAST) + 2..to {
+            let bend = self.block(i).1 - 2.0 * self.block(i - 1).1 + self.block(i - 2).1;
+            squares += bend * bend;
         }
-        (0.5 * squares / f64::from(LAST - 1) * f64::from(self.length)).sqrt()
+        // Of white noise, 1 + 4 + 1 times its square.
+        (squares / (6.0 * f64::from(LAST - 2)) * f64::from(self.length)).sqrt()
     }
 
     /// Whether the last `blocks` blocks, at least 2, all hold the very same torque, which no live sensor gives.

@@ -31,7 +31,8 @@ impl Homing {
                 }
             }
             Phase::Offset => {
-                if self.follow() {
+                // Homed is homed where the axis is, not where its command is.
+                if self.follow() && self.sides.iter().take(self.plan.motors).all(|side| side.settled(&self.plan)) {
                     self.set();
                 }
             }
@@ -46,23 +47,26 @@ impl Homing {
         }
     }
 
-    /// A cycle on the way out: braking, unloading and restoring go on whatever the input says.
+    /// A cycle on the way out: it ends whatever the input says, without a move where position or drive are not to be
+    /// trusted.
     pub(super) fn exit(&mut self, input: &HomingInput) {
         self.now += 1;
+        let mut trusted = input.flags & !GIB_INPUT_ABORT == 0;
         for (i, side) in self.sides.iter_mut().enumerate().take(self.plan.motors) {
-            if input.position_mm[i].is_finite() && input.torque[i].is_finite() {
-                side.sense(&self.plan, input.position_mm[i], input.torque[i]);
+            let (position, torque) = (input.position_mm[i], input.torque[i]);
+            if side.trusted(&self.plan, position, torque) {
+                side.sense(&self.plan, position, torque);
+            } else {
+                trusted = false;
             }
         }
-        if self.now >= self.deadline {
+        if !trusted && self.output.stop_drive == 0 {
+            self.stop_drive();
+        } else if self.now >= self.deadline {
             self.overdue_exit();
-        } else if self.phase == Phase::Restore {
-            if self.confirmed(input) {
-                self.changed = false;
-                self.fail();
-            }
         } else {
             match self.phase {
+                Phase::Restore => self.restoring(input),
                 Phase::Stopping if self.stopped => self.unload(),
                 Phase::Stopping => self.stopped = self.arrived(),
                 Phase::Unload => self.unloading(),
@@ -76,28 +80,50 @@ impl Homing {
     fn overdue_exit(&mut self) {
         match self.phase {
             Phase::Restore => self.give_up(),
-            Phase::Unload => self.relieve(),
-            _ => self.restore(),
+            Phase::Unload if self.hears() => self.enter(Phase::Relieve, f64::from(self.plan.ack_timeout)),
+            // Nobody can tell when the torque is off.
+            _ => self.stop_drive(),
         }
     }
 
-    /// One cycle off the stop. Ends where the command ends and the axis has followed.
-    fn unloading(&mut self) {
-        let back = self.arrived();
-        if back && self.sides.iter().take(self.plan.motors).all(|side| side.settled(&self.plan)) {
+    /// No command can be trusted to make the axis safe: the torque is to be taken off it.
+    #[cold]
+    fn stop_drive(&mut self) {
+        self.output.stop_drive = 1;
+        self.sides.iter_mut().for_each(|side| side.clear_lag(&self.plan));
+        if self.phase != Phase::Restore {
             self.restore();
         }
     }
 
-    /// The axis did not follow, something holds it: the servo must not go on pulling once it has its full torque. A
-    /// torque sensor at fault cannot tell.
-    fn relieve(&mut self) {
-        if matches!(self.fault.code, GIB_ERR_HOMING_TORQUE_STUCK | GIB_ERR_HOMING_TORQUE_SIGN) {
-            return self.restore();
+    fn restoring(&mut self, input: &HomingInput) {
+        if self.confirmed(input) {
+            self.changed = false;
+            self.fail();
         }
-        self.enter(Phase::Relieve, f64::from(self.plan.ack_timeout));
     }
 
+    /// Whether the torque tells anything.
+    fn hears(&self) -> bool {
+        !matches!(self.fault.code, GIB_ERR_HOMING_TORQUE_STUCK | GIB_ERR_HOMING_TORQUE_SIGN)
+    }
+
+    /// One cycle off the stop. Ends where the command ends, the axis has followed, and nothing holds it.
+    fn unloading(&mut self) {
+        let (plan, tight) = (self.plan, self.fault.code == GIB_ERR_HOMING_TIGHT_SPOT);
+        let mut sides = self.sides.iter().take(plan.motors);
+        // On a tight spot the encoder rightly stands.
+        if !tight && sides.any(|side| side.frozen_in_move(&plan)) {
+            return self.stop_drive();
+        }
+        let back = self.arrived();
+        let free = |side: &Side| side.settled(&plan) && (side.light(&plan) || !self.hears());
+        if back && self.sides.iter().take(plan.motors).all(free) {
+            self.restore();
+        }
+    }
+
+    /// The axis did not follow, something holds it: the servo must not go on pulling once it has its full torque.
     fn relieving(&mut self) {
         let mut all = true;
         for side in self.sides.iter_mut().take(self.plan.motors) {
@@ -198,11 +224,6 @@ impl Homing {
 
     #[cold]
     fn begin(&mut self, input: &HomingInput) {
-        if !input.torque_limit.is_finite() {
-            let field = "torque_limit\0";
-            let fault = Fault { code: GIB_ERR_NON_FINITE, field, value: input.torque_limit, ..Fault::NONE };
-            return self.leave(fault);
-        }
         for (side, position) in self.sides.iter_mut().zip(input.position_mm) {
             side.begin(&self.plan, position);
         }
@@ -232,7 +253,7 @@ impl Homing {
         let (mut way, mut fault) = (0f64, Fault::NONE);
         for side in self.sides.iter().take(plan.motors) {
             way = way.max(side.travel(&plan));
-            let first = odd == Touch::Broken && fault == Fault::NONE && side.rigid(&plan);
+            let first = odd == Touch::Broken && fault == Fault::NONE && (side.rigid(&plan) || side.stuck(&plan));
             fault = if first { side.broken_sensor(&plan) } else { fault };
         }
         if fault == Fault::NONE {
@@ -272,6 +293,9 @@ impl Homing {
         if self.touch == 0 {
             let way = self.sides.iter().take(plan.motors).map(|side| side.travel(&plan)).fold(f64::INFINITY, f64::min);
             let early = |code, low| Fault { code, field: "distance_min_mm\0", value: way, low, high: plan.distance[1] };
+            if self.sides.iter().take(plan.motors).any(|side| side.stuck_high(&plan)) {
+                return self.leave(Fault { field: "torque\0", ..Fault::of(GIB_ERR_HOMING_TORQUE_STUCK) });
+            }
             if way < plan.retract {
                 return self.leave(early(GIB_ERR_HOMING_ON_STOP, plan.retract));
             }
@@ -279,6 +303,8 @@ impl Homing {
                 return self.leave(early(GIB_ERR_HOMING_EARLY, plan.distance[0]));
             }
             self.event(GIB_HOMING_EVENT_LIMITING);
+        } else if let Some(fault) = self.sides.iter().take(plan.motors).find_map(|side| side.pressed_at_once(&plan)) {
+            return self.leave(fault);
         }
         if self.touch < plan.touches {
             let mut bound = 0f64;
@@ -326,7 +352,7 @@ impl Homing {
             bound = bound.max(self.sides[i].go(&plan, home, plan.offset_speed));
         }
         self.event(GIB_HOMING_EVENT_OFFSET);
-        self.enter(Phase::Offset, bound);
+        self.enter(Phase::Offset, bound + plan.settling());
     }
 
     /// Off the stop: the coordinate is set and the old torque limit given back.
@@ -346,17 +372,20 @@ impl Homing {
         self.sides[0].look_no_further();
         self.fault = fault;
         self.output.message = fault.code;
-        // Without a position to trust no move is safe; a faulted drive makes none.
-        let blind = matches!(fault.code, GIB_ERR_NON_FINITE | GIB_ERR_HOMING_ENCODER);
-        self.output.stop_drive = i32::from(blind);
-        if blind || matches!(fault.code, GIB_ERR_DRIVE_FAULT) || matches!(self.phase, Phase::Begin | Phase::Limit) {
+        // Without a position to trust no move is safe, and a faulted drive makes none.
+        let blind = matches!(fault.code, GIB_ERR_HOMING_ENCODER | GIB_ERR_DRIVE_FAULT)
+            || (fault.code == GIB_ERR_NON_FINITE && fault.field != LIMIT_IN_FORCE);
+        if blind {
+            return self.stop_drive();
+        }
+        self.output.stop_drive = 0;
+        if matches!(self.phase, Phase::Begin | Phase::Limit) {
             self.sides.iter_mut().for_each(|side| side.clear_lag(&self.plan));
             return self.restore();
         }
         let mut bound = 0f64;
         for side in self.sides.iter_mut().take(self.plan.motors) {
-            side.profile.stop();
-            bound = bound.max(side.profile.cycles_bound());
+            bound = bound.max(side.brake());
         }
         self.stopped = false;
         self.enter(Phase::Stopping, bound);
@@ -367,14 +396,16 @@ impl Homing {
     fn unload(&mut self) {
         let plan = self.plan;
         let mut bound = 0f64;
+        if self.sides.iter().take(plan.motors).any(Side::dead) {
+            return self.stop_drive();
+        }
         for side in self.sides.iter_mut().take(plan.motors) {
             let behind = plan.sense * (side.profile.position - side.position) > 0.1 * plan.press_max;
-            let loaded = side.pressing() || behind;
+            let loaded = side.pressing(&plan) || behind;
             let goal = if loaded { side.position - plan.sense * plan.press_max } else { side.profile.position };
             bound = bound.max(side.go(&plan, goal, plan.approach));
         }
-        let settling = 4.0 * f64::from(plan.detection);
-        self.enter(Phase::Unload, bound + settling);
+        self.enter(Phase::Unload, bound + plan.settling());
     }
 
     /// Last part of the door: gives the old torque limit back if it was changed.

@@ -1,0 +1,176 @@
+//! What is to blame when a motor's readings break a bound or contradict each other.
+//!
+//! A standing encoder, a torque that says nothing or the wrong thing, an axis that something holds and a command that
+//! nobody follows look alike in one cycle; they differ in what the torque did meanwhile.
+
+use super::*;
+
+/// Change of torque, as a share of the limit, that no standing encoder explains: a stop gives way by some counts of
+/// the encoder. After a turn, friction on the motor's side may hold the motor while its torque changes sense.
+pub const RIGID: f64 = 0.3;
+const RIGID_AFTER_TURN: f64 = 0.8;
+/// Share of the retraction after which a turn is over.
+const UNDER_WAY: f64 = 0.04;
+/// Share of a reading's noise that is left in the filtered torque: √(GAIN/(2 − GAIN)).
+const FILTERED: f64 = 0.26;
+/// Mean of |x₀ − 2x₁ + x₂| for white noise of standard deviation 1: √6·√(2/π).
+const BENT: f64 = 1.954;
+/// Cycles within which an axis that was moving shows some motion.
+const ALIVE: u32 = 8;
+
+impl Side {
+    /// Which bound is broken.
+    #[cold]
+    pub fn name_danger(&self, plan: &Plan, position: f64, torque: f64) -> Fault {
+        let fault = |code, field, value, low, high| Fault { code, field, value, low, high };
+        for (field, value) in [("position_mm\0", position), ("torque\0", torque)] {
+            if !value.is_finite() {
+                return fault(GIB_ERR_NON_FINITE, field, value, f64::MIN, f64::MAX);
+            }
+        }
+        let lag = self.profile.position - position;
+        if self.filtered.abs() > plan.bound {
+            // A bound three standard deviations off was broken by the sensor, not by the drive.
+            let code = if self.noisy(plan) { GIB_ERR_HOMING_NOISE } else { GIB_ERR_TORQUE_BOUND };
+            fault(code, "torque\0", torque, -plan.bound, plan.bound)
+        } else if (position - self.position).abs() > plan.jump {
+            fault(GIB_ERR_HOMING_ENCODER, "position_mm\0", position - self.position, -plan.jump, plan.jump)
+        } else if lag.abs() > plan.lag_limit {
+            self.contradiction(plan, fault(GIB_ERR_LAG, "position_mm\0", lag, -plan.lag_limit, plan.lag_limit))
+        } else {
+            let way = plan.sense * (position - self.start);
+            fault(GIB_ERR_TRAVEL_BOUND, "position_mm\0", way, 0.0, plan.distance[1])
+        }
+    }
+
+    /// The axis does not follow, which is `otherwise` unless the torque says more: the torque sensor's fault if it says that nothing holds the axis, a tight spot if it
+    /// is held on the way back.
+    pub fn contradiction(&self, plan: &Plan, otherwise: Fault) -> Fault {
+        if self.back(plan) && self.filtered < -0.5 * plan.threshold {
+            let (code, field) = (GIB_ERR_HOMING_TIGHT_SPOT, "torque\0");
+            return Fault { code, field, value: self.filtered, low: 0.0, high: plan.limit };
+        }
+        self.torque_fault(plan).unwrap_or(otherwise)
+    }
+
+    /// What is to blame for a touch or move that is [`Touch::Broken`].
+    #[cold]
+    pub fn broken_sensor(&self, plan: &Plan) -> Fault {
+        // A torque that jumped and has stood since.
+        if self.stuck(plan) || self.same >= 2 {
+            return Fault { value: self.reading, field: "torque\0", ..Fault::of(GIB_ERR_HOMING_TORQUE_STUCK) };
+        }
+        if self.loaded && self.position == self.start {
+            return Fault { value: self.reading, field: "torque\0", ..Fault::of(GIB_ERR_HOMING_ON_STOP) };
+        }
+        if 3.0 * self.noise() > RIGID * plan.limit {
+            return Fault { value: self.reading, field: "torque\0", ..Fault::of(GIB_ERR_HOMING_NOISE) };
+        }
+        // A servo whose encoder stands winds its torque up in the sense of the command; a command that does not reach
+        // the servo leaves it as it is.
+        let sense = if self.back(plan) { -1.0 } else { 1.0 };
+        let wound = sense * (self.filtered - self.free[1]) > 0.05 * plan.limit + 4.0 * FILTERED * self.noise();
+        let code = if wound { GIB_ERR_HOMING_ENCODER } else { GIB_ERR_LAG };
+        let otherwise = Fault { field: "position_mm\0", value: self.position, ..Fault::of(code) };
+        self.torque_fault(plan).unwrap_or(otherwise)
+    }
+
+    /// What is wrong with the torque of an axis that stands against its command, if anything.
+    fn torque_fault(&self, plan: &Plan) -> Option<Fault> {
+        let fault = |code, field, value| Some(Fault { code, field, value, low: 0.0, high: plan.limit });
+        if self.stuck(plan) {
+            fault(GIB_ERR_HOMING_TORQUE_STUCK, "torque\0", self.reading)
+        } else if lower(self.filtered, plan.torque_sense * self.reading) < -0.5 * plan.threshold && !self.back(plan) {
+            fault(GIB_ERR_HOMING_TORQUE_SIGN, "torque_inverted\0", self.filtered)
+        } else {
+            None
+        }
+    }
+
+    /// Whether the torque reading has not changed by one digit for long, or on a way that the axis has gone under it.
+    #[must_use]
+    pub fn stuck(&self, plan: &Plan) -> bool {
+        self.trace.stuck(STUCK_BLOCKS) || (self.position - self.changed_at).abs() > 0.25 * plan.retract
+    }
+
+    /// Standard deviation of a reading: what the touch showed, or what has come since.
+    fn noise(&self) -> f64 {
+        self.trace.noise().max(self.rough / BENT)
+    }
+
+    /// Whether the command leads away from the stop.
+    fn back(&self, plan: &Plan) -> bool {
+        plan.sense * (self.profile.position + self.profile.left() - self.position) < 0.0
+    }
+
+    /// Whether the torque tolerance is less than three standard deviations of the filtered torque.
+    fn noisy(&self, plan: &Plan) -> bool {
+        3.0 * FILTERED * self.noise() > plan.bound - plan.limit
+    }
+
+    /// The encoder stands. Whether it should not: the command has gone on for long, or the torque has changed as on
+    /// something infinitely rigid. Both the reading and its filtered value must say so: one is noisy, one is late.
+    #[must_use]
+    pub fn rigid(&self, plan: &Plan) -> bool {
+        let under_way = (self.position - self.from).abs() > UNDER_WAY * plan.retract;
+        let never_moved = self.position == self.origin && self.filtered >= plan.threshold;
+        let share = if under_way { RIGID } else { RIGID_AFTER_TURN };
+        let most = share * plan.limit;
+        let changed = (self.reading - self.free[0]).abs() > most && (self.filtered - self.free[1]).abs() > 0.5 * most;
+        let patience = if under_way { self.frozen_limit } else { 3 * self.frozen_limit };
+        let long = self.frozen > patience && self.filtered.abs() < plan.release;
+        never_moved || changed || long
+    }
+
+    /// What the way back tells, if anything is wrong with what was pressed on. `level`: torque before contact. Nothing
+    /// is said of a way back too short to slide steadily.
+    #[must_use]
+    pub fn held_back(&self, plan: &Plan, level: f64) -> Option<Fault> {
+        let fault = |code, field, value, high| Some(Fault { code, field, value, low: 0.0, high });
+        let (above, high) = (self.sliding - self.lowest, 0.5 * (plan.threshold - level));
+        let stayed = plan.sense * (self.position - self.profile.position) > 0.5 * plan.retract;
+        if stayed && self.lowest > -0.5 * plan.threshold {
+            // Nothing pulled.
+            fault(GIB_ERR_LAG, "position_mm\0", self.profile.position - self.position, plan.lag_limit)
+        } else if self.sliding >= plan.release {
+            // Away from the stop, and still at the limit toward it.
+            fault(GIB_ERR_HOMING_TORQUE_STUCK, "torque\0", self.sliding, plan.release)
+        } else if stayed || above > high + 4.0 * FILTERED * self.noise() {
+            // A stop pushes the axis back; a tight spot takes as much torque above what sliding takes both ways.
+            fault(GIB_ERR_HOMING_TIGHT_SPOT, "torque\0", -self.lowest, plan.limit)
+        } else {
+            None
+        }
+    }
+
+    /// Whether the encoder stands in a move, and should not.
+    #[inline(always)]
+    #[must_use]
+    pub fn frozen_in_move(&self, plan: &Plan) -> bool {
+        self.frozen > 0 && self.profile.speed != 0.0 && self.rigid(plan)
+    }
+
+    /// Whether a torque that stands at the limit is none: it did before the touch began.
+    #[must_use]
+    pub fn stuck_high(&self, plan: &Plan) -> bool {
+        self.loaded && self.same >= plan.hold
+    }
+
+    /// What is wrong with a measured touch that ends too close to where it began: there the axis was free before.
+    #[must_use]
+    pub fn pressed_at_once(&self, plan: &Plan) -> Option<Fault> {
+        let (way, field, low) = ((self.position - self.origin).abs(), "retract_mm\0", 0.5 * plan.retract);
+        let code = match () {
+            () if self.same >= plan.hold => GIB_ERR_HOMING_TORQUE_STUCK,
+            () if way < 0.1 * low => GIB_ERR_HOMING_ENCODER,
+            () => GIB_ERR_HOMING_TOUCHES,
+        };
+        (way < low).then_some(Fault { code, field, value: way, low, high: plan.retract })
+    }
+
+    /// On the way out: an axis that was moving when it began to brake has not moved since.
+    #[must_use]
+    pub fn dead(&self) -> bool {
+        self.moving && self.position == self.from && self.frozen >= ALIVE
+    }
+}
