@@ -191,7 +191,8 @@ int homing_names(homing_fault fault, int32_t first, const homing_branch *b)
         [FAULT_TORQUE_INVERTED] = {GIB_ERR_HOMING_TORQUE_SIGN, GIB_ERR_HOMING_ENCODER, GIB_ERR_HOMING_TIGHT_SPOT, GIB_DONE},
         /* Under pressure a single reading may be too much before it is known for noise. */
         [FAULT_TORQUE_NOISY] = {GIB_ERR_HOMING_NOISE, GIB_ERR_TORQUE_BOUND, GIB_ERR_HOMING_ENCODER, GIB_DONE},
-        [FAULT_ENCODER_FROZEN] = {GIB_ERR_HOMING_ENCODER, GIB_DONE},
+        /* At the start it is an axis that cannot move. */
+        [FAULT_ENCODER_FROZEN] = {GIB_ERR_HOMING_ENCODER, GIB_ERR_HOMING_ON_STOP, GIB_DONE},
         [FAULT_ENCODER_SLIPS] = {GIB_ERR_HOMING_TOUCHES, GIB_DONE},
         [FAULT_ENCODER_JUMPS] = {GIB_ERR_HOMING_ENCODER},
         [FAULT_NO_ACKNOWLEDGEMENT] = {GIB_ERR_ACK_TIMEOUT},

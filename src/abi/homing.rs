@@ -175,23 +175,35 @@ pub unsafe extern "C" fn gib_homing_step(
         output.target_position_mm = input.position_mm;
         return output.status;
     }
-    if handle.alive == ALIVE && handle.machine.quick(input) {
-        *output = *handle.machine.output();
-        return output.status;
+    if handle.alive != ALIVE {
+        return step_from_rest(handle, input, output);
     }
-    step_in_full(handle, input, output)
+    if !handle.machine.quick(input) {
+        return step_unlike(handle, input, output);
+    }
+    *output = *handle.machine.output();
+    output.status
 }
 
-/// Any cycle, or one of no living instance. `extern "C"`: it cannot unwind, so that it is called by a jump.
+/// A cycle at work that is not like the one before. `extern "C"`: it cannot unwind, so that it is called by a jump.
 #[inline(never)]
-extern "C" fn step_in_full(handle: &mut GibHoming, input: &HomingInput, output: &mut HomingOutput) -> i32 {
-    if !handle.alive() {
-        return misused(Some(handle), Some(input), Some(output));
-    }
+extern "C" fn step_unlike(handle: &mut GibHoming, input: &HomingInput, output: &mut HomingOutput) -> i32 {
     if !handle.machine.quick_slow(input) {
         handle.machine.step(input);
         handle.mark();
     }
+    *output = *handle.machine.output();
+    output.status
+}
+
+/// A cycle of an instance that has nothing to do, or of no living one. `extern "C"` as above.
+#[inline(never)]
+extern "C" fn step_from_rest(handle: &mut GibHoming, input: &HomingInput, output: &mut HomingOutput) -> i32 {
+    if !handle.alive() {
+        return misused(Some(handle), Some(input), Some(output));
+    }
+    handle.machine.step(input);
+    handle.mark();
     *output = *handle.machine.output();
     output.status
 }

@@ -199,22 +199,22 @@ impl Homing {
         }
     }
 
-    /// One servo cycle if it is like the one before, which most are; false when it is not, and nothing is done.
+    /// One servo cycle if it is like the one before, which most are; when it is not, [`Homing::quick_slow`] must follow.
     #[inline(always)]
     pub fn quick(&mut self, input: &HomingInput) -> bool {
         let [side, _] = &mut self.sides;
-        let done = input.flags == 0 && side.quick(&self.plan, input.position_mm[0], input.torque[0]);
+        let done = side.quick(&self.plan, input.position_mm[0], input.torque[0], input.flags);
         if done {
             self.output.target_position_mm[0] = side.profile.position;
         }
         done
     }
 
-    /// The same for a cycle that is not at constant speed.
+    /// The same for a cycle that is not at constant speed; false when it is unlike too, and nothing is done.
     #[inline(always)]
     pub fn quick_slow(&mut self, input: &HomingInput) -> bool {
         let [side, _] = &mut self.sides;
-        let done = input.flags == 0 && side.quick_slow(&self.plan, input.position_mm[0], input.torque[0]);
+        let done = side.quick_slow(&self.plan, input.position_mm[0], input.torque[0], input.flags);
         if done {
             self.output.target_position_mm[0] = side.profile.position;
             self.output.target_speed_mm_s[0] = side.profile.speed * self.plan.cycles_per_s;

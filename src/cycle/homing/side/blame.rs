@@ -11,6 +11,8 @@ pub const RIGID: f64 = 0.3;
 const RIGID_AFTER_TURN: f64 = 0.8;
 /// Share of the retraction after which a turn is over.
 const UNDER_WAY: f64 = 0.04;
+/// Share of the limit beyond which a torque that changes to its opposite while the encoder stands has changed its sign.
+const FLIPPED: f64 = 0.2;
 /// Share of a reading's noise that is left in the filtered torque: √(GAIN/(2 − GAIN)).
 const FILTERED: f64 = 0.26;
 /// Mean of |x₀ − 2x₁ + x₂| for white noise of standard deviation 1: √6·√(2/π).
@@ -56,8 +58,8 @@ impl Side {
     /// What is to blame for a touch or move that is [`Touch::Broken`].
     #[cold]
     pub fn broken_sensor(&self, plan: &Plan) -> Fault {
-        // A torque that jumped and has stood since.
-        if self.stuck(plan) || self.same >= 2 {
+        // A torque that jumped and stands since.
+        if self.stuck(plan) || self.same >= 1 {
             return Fault { value: self.reading, field: "torque\0", ..Fault::of(GIB_ERR_HOMING_TORQUE_STUCK) };
         }
         if self.loaded && self.position == self.start {
@@ -69,6 +71,11 @@ impl Side {
         // A servo whose encoder stands winds its torque up in the sense of the command; a command that does not reach
         // the servo leaves it as it is.
         let sense = if self.back(plan) { -1.0 } else { 1.0 };
+        let along = |torque: f64| sense * plan.torque_sense * torque;
+        if along(self.free[0]) > FLIPPED * plan.limit && along(self.reading) < -FLIPPED * plan.limit {
+            let code = GIB_ERR_HOMING_TORQUE_SIGN;
+            return Fault { field: "torque_inverted\0", value: self.reading, ..Fault::of(code) };
+        }
         let wound = sense * (self.filtered - self.free[1]) > 0.05 * plan.limit + 4.0 * FILTERED * self.noise();
         let code = if wound { GIB_ERR_HOMING_ENCODER } else { GIB_ERR_LAG };
         let otherwise = Fault { field: "position_mm\0", value: self.position, ..Fault::of(code) };
@@ -132,9 +139,9 @@ impl Side {
         if stayed && self.lowest > -0.5 * plan.threshold {
             // Nothing pulled.
             fault(GIB_ERR_LAG, "position_mm\0", self.profile.position - self.position, plan.lag_limit)
-        } else if self.sliding >= plan.release {
+        } else if self.sliding.max(self.filtered) >= plan.release {
             // Away from the stop, and still at the limit toward it.
-            fault(GIB_ERR_HOMING_TORQUE_STUCK, "torque\0", self.sliding, plan.release)
+            fault(GIB_ERR_HOMING_TORQUE_STUCK, "torque\0", self.reading, plan.release)
         } else if stayed || above > high + 4.0 * FILTERED * self.noise() {
             // A stop pushes the axis back; a tight spot takes as much torque above what sliding takes both ways.
             fault(GIB_ERR_HOMING_TIGHT_SPOT, "torque\0", -self.lowest, plan.limit)

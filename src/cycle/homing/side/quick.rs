@@ -6,32 +6,32 @@ use super::*;
 
 impl Side {
     /// One cycle in a few instructions, for one that is like the one before: at constant speed, encoder and torque
-    /// alive, all within bounds. False when it is not; nothing has changed then. The bounds are those of [`Side::safe`];
+    /// alive, all within bounds. False when it is not: [`Side::quick_slow`] must follow. The bounds are those of [`Side::safe`];
     /// those of way and time are in `cruise`, those of lag and jump in `lag_band`.
     #[inline(always)]
-    pub fn quick(&mut self, plan: &Plan, position: f64, torque: f64) -> bool {
+    pub fn quick(&mut self, plan: &Plan, position: f64, torque: f64, flags: u32) -> bool {
         let filtered = (1.0 - GAIN) * self.filtered + plan.torque_share * torque;
         let lag = self.profile.position - position;
-        // Written so that a NaN is not usual.
-        // Counted down first: that takes the fewest instructions.
+        // Counted down first: that takes the fewest instructions. Written so that a NaN is not usual.
         self.cruise -= 1;
         let usual = self.cruise >= 0
+            && flags == 0
             && (lag - self.usual_lag).abs() <= self.lag_band
             && position != self.position
             && filtered > plan.bound_below
-            && filtered < self.trip;
-        if !usual {
-            self.cruise += 1;
-            return false;
+            && !(filtered >= self.trip);
+        if usual {
+            self.take_in(position, torque, filtered);
+            self.profile.cruise_on();
         }
-        self.take_in(position, torque, filtered);
-        self.profile.cruise_on();
-        true
+        usual
     }
 
-    /// The same where the command speeds up or brakes, the motor sticks, or it stands pressed.
+    /// The same where the command speeds up or brakes, the motor sticks, or it stands pressed. Comes after a
+    /// [`Side::quick`] that was false, and takes back what that has counted.
     #[inline(always)]
-    pub fn quick_slow(&mut self, plan: &Plan, position: f64, torque: f64) -> bool {
+    pub fn quick_slow(&mut self, plan: &Plan, position: f64, torque: f64, flags: u32) -> bool {
+        self.cruise += 1;
         let filtered = (1.0 - GAIN) * self.filtered + plan.torque_share * torque;
         let goes_on = if self.held {
             (position - self.anchor).abs() <= plan.standing_way
@@ -39,6 +39,7 @@ impl Side {
             (position != self.position) != (self.frozen > 0)
         };
         let usual = self.slow != 0
+            && flags == 0
             && self.safe(plan, position, torque)
             && filtered > self.low
             && filtered < self.high
