@@ -19,9 +19,6 @@ use crate::error::*;
 
 mod sequence;
 
-/// Field of the input that only matters where a request is confirmed.
-const LIMIT_IN_FORCE: &str = "torque_limit\0";
-
 /// Where the machine is. Each comment says what ends the state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
@@ -254,6 +251,9 @@ impl Homing {
         self.now += 1;
         if let Some(fault) = self.danger(input) {
             self.leave(fault);
+        } else if !input.torque_limit.is_finite() {
+            let (field, value) = ("torque_limit\0", input.torque_limit);
+            self.leave_by(Fault { field, value, ..Fault::of(GIB_ERR_NON_FINITE) }, false);
         } else if self.now >= self.deadline {
             self.overdue();
         } else {
@@ -281,7 +281,7 @@ impl Homing {
     /// Anything in this cycle's input that must end homing.
     #[inline(always)]
     fn danger(&self, input: &HomingInput) -> Option<Fault> {
-        let mut safe = input.flags == 0 && input.torque_limit.is_finite();
+        let mut safe = input.flags == 0;
         for (i, side) in self.sides.iter().enumerate().take(self.plan.motors) {
             safe &= side.safe(&self.plan, input.position_mm[i], input.torque[i]);
         }
@@ -295,10 +295,6 @@ impl Homing {
         }
         if input.flags != 0 {
             return Some(Fault::of(GIB_ERR_DRIVE_FAULT));
-        }
-        if !input.torque_limit.is_finite() {
-            let value = input.torque_limit;
-            return Some(Fault { code: GIB_ERR_NON_FINITE, field: LIMIT_IN_FORCE, value, ..Fault::NONE });
         }
         for (i, side) in self.sides.iter().enumerate().take(self.plan.motors) {
             let (position, torque) = (input.position_mm[i], input.torque[i]);
@@ -327,7 +323,7 @@ impl Homing {
             Phase::Offset => {
                 // The command has long ended.
                 let lag = Fault { field: "position_mm\0", ..Fault::of(GIB_ERR_LAG) };
-                let behind = self.sides.iter().take(self.plan.motors).find(|side| !side.settled(&self.plan));
+                let behind = self.sides.iter().take(self.plan.motors).find(|side| !side.came(&self.plan));
                 self.leave(behind.map_or(lag, |side| side.contradiction(&self.plan, lag)));
             }
             _ => self.leave(Fault { code: GIB_ERR_DEADLINE, field: "phase\0", ..Fault::NONE }),

@@ -271,6 +271,14 @@ impl Side {
         position.is_finite() && torque.is_finite() && (position - self.position).abs() <= plan.jump
     }
 
+    /// The axis has gone with its command: nearly all the way, or most of it when nothing holds it, which a servo without
+    /// integral leaves.
+    #[must_use]
+    pub fn came(&self, plan: &Plan) -> bool {
+        let way = (self.profile.position - self.from).abs();
+        self.settled(plan) || (self.light(plan) && (self.profile.position - self.position).abs() <= 0.5 * way)
+    }
+
     /// Whether something is pressed on, or torque enough is on for it to be.
     #[must_use]
     pub fn pressing(&self, plan: &Plan) -> bool {

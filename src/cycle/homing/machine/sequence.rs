@@ -32,7 +32,7 @@ impl Homing {
             }
             Phase::Offset => {
                 // Homed is homed where the axis is, not where its command is.
-                if self.follow() && self.sides.iter().take(self.plan.motors).all(|side| side.settled(&self.plan)) {
+                if self.follow() && self.sides.iter().take(self.plan.motors).all(|side| side.came(&self.plan)) {
                     self.set();
                 }
             }
@@ -362,9 +362,15 @@ impl Homing {
         self.enter(Phase::Set, f64::from(self.plan.ack_timeout));
     }
 
-    /// The one door out: keeps the first fault, brakes, unloads, restores, fails.
+    /// Leaves for a fault: without a position to trust no move is safe, and a faulted drive makes none.
     #[cold]
     pub(super) fn leave(&mut self, fault: Fault) {
+        self.leave_by(fault, matches!(fault.code, GIB_ERR_HOMING_ENCODER | GIB_ERR_DRIVE_FAULT | GIB_ERR_NON_FINITE));
+    }
+
+    /// The one door out: keeps the first fault, brakes, unloads, restores, fails. `blind`: without a move.
+    #[cold]
+    pub(super) fn leave_by(&mut self, fault: Fault, blind: bool) {
         if matches!(self.phase, Phase::Stopping | Phase::Unload | Phase::Relieve | Phase::Restore) {
             return; // on the way out already
         }
@@ -372,9 +378,6 @@ impl Homing {
         self.sides[0].look_no_further();
         self.fault = fault;
         self.output.message = fault.code;
-        // Without a position to trust no move is safe, and a faulted drive makes none.
-        let blind = matches!(fault.code, GIB_ERR_HOMING_ENCODER | GIB_ERR_DRIVE_FAULT)
-            || (fault.code == GIB_ERR_NON_FINITE && fault.field != LIMIT_IN_FORCE);
         if blind {
             return self.stop_drive();
         }
