@@ -30,7 +30,7 @@ fn main() -> ExitCode {
             table_friction_share: 0.5,
             damping_ratio: 0.05,
         },
-        Effect::Backlash { width_um: 20.0, table_inertia_share: 0.5, table_friction_share: 0.5 },
+        Effect::Backlash { width_um: 20.0, table_inertia_share: 0.5, table_friction_share: 0.5, contact_hz: 700.0 },
         Effect::PreslidingFriction { displacement_um: 8.0 },
         Effect::StribeckFriction { torque: 0.3, velocity_mm_s: 4.0 },
     ]);
