@@ -132,7 +132,7 @@ static void assert_refused(const fixture *f, const gib_diagnosis_config *config,
     assert_says(text, part);
     /* Nothing is left to be worked at or read. */
     gib_diagnosis_report report = {.verdict = 9};
-    assert_int_equal(gib_diagnosis_step(f->diagnosis, NULL, NULL), GIB_ERR_STATE);
+    assert_int_equal(gib_diagnosis_run(f->diagnosis, NULL, NULL), GIB_ERR_STATE);
     assert_int_equal(gib_diagnosis_result(f->diagnosis, &report), GIB_ERR_STATE);
     assert_int_equal(report.verdict, 0);
 }
@@ -158,7 +158,7 @@ static void a_wrong_belief_is_found_and_its_extension_holds(void **state)
     gib_diagnosis_report report;
     struct told told = {0};
     assert_int_equal(gib_diagnosis_start(f->diagnosis, &config), GIB_OK);
-    assert_int_equal(gib_diagnosis_step(f->diagnosis, tell, &told), GIB_DONE);
+    assert_int_equal(gib_diagnosis_run(f->diagnosis, tell, &told), GIB_DONE);
     assert_true(told.calls > 3);
     assert_int_equal(gib_diagnosis_result(f->diagnosis, &report), GIB_OK);
     assert_int_equal(report.verdict, GIB_DIAGNOSIS_EXPLAINED);
@@ -179,7 +179,7 @@ static void a_wrong_belief_is_found_and_its_extension_holds(void **state)
     assert_int_equal(gib_machine_load(f->machine, f->machine_file), GIB_OK);
     assert_int_equal(gib_diagnosis_start(f->diagnosis, &config), GIB_OK);
     assert_int_equal(gib_diagnosis_result(f->diagnosis, &report), GIB_ERR_STATE); /* the old result is forgotten */
-    assert_int_equal(gib_diagnosis_step(f->diagnosis, NULL, NULL), GIB_DONE);
+    assert_int_equal(gib_diagnosis_run(f->diagnosis, NULL, NULL), GIB_DONE);
     assert_int_equal(gib_diagnosis_result(f->diagnosis, &report), GIB_OK);
     assert_int_equal(report.verdict, GIB_DIAGNOSIS_NO_DISCREPANCY);
     assert_int_equal(report.findings, 0);
@@ -197,7 +197,7 @@ static void a_second_recording_measures_the_gain(void **state)
     gib_diagnosis_report report;
     assert_int_equal(gib_diagnosis_start(f->diagnosis, &config), GIB_OK);
     unlink(holdout); /* it was read */
-    assert_int_equal(gib_diagnosis_step(f->diagnosis, NULL, NULL), GIB_DONE);
+    assert_int_equal(gib_diagnosis_run(f->diagnosis, NULL, NULL), GIB_DONE);
     assert_int_equal(gib_diagnosis_result(f->diagnosis, &report), GIB_OK);
     assert_true(report.residual_after > 0.0 && report.residual_before > 3.0 * report.residual_after);
 }
@@ -237,7 +237,7 @@ static void what_cannot_be_used_is_refused_by_name(void **state)
     assert_int_equal(gib_diagnosis_start(f->diagnosis, &config), GIB_ERR_STATE);
     gib_machine_free(empty);
     assert_int_equal(gib_diagnosis_start(NULL, &config), GIB_ERR_NULL);
-    assert_int_equal(gib_diagnosis_step(NULL, NULL, NULL), GIB_ERR_NULL);
+    assert_int_equal(gib_diagnosis_run(NULL, NULL, NULL), GIB_ERR_NULL);
     assert_int_equal(gib_diagnosis_abort(NULL), GIB_ERR_NULL);
     assert_int_equal(gib_diagnosis_result(f->diagnosis, NULL), GIB_ERR_NULL);
     assert_int_equal(gib_diagnosis_machine(f->diagnosis, f->machine), GIB_ERR_STATE);
@@ -251,7 +251,7 @@ static void a_recording_that_does_not_suffice_is_a_verdict(void **state)
     gib_diagnosis_config config = config_of(f);
     gib_diagnosis_report report;
     assert_int_equal(gib_diagnosis_start(f->diagnosis, &config), GIB_OK);
-    assert_int_equal(gib_diagnosis_step(f->diagnosis, NULL, NULL), GIB_DONE);
+    assert_int_equal(gib_diagnosis_run(f->diagnosis, NULL, NULL), GIB_DONE);
     assert_int_equal(gib_diagnosis_result(f->diagnosis, &report), GIB_OK);
     assert_int_equal(report.verdict, GIB_DIAGNOSIS_INSUFFICIENT_DATA);
     char *json = json_of(f->diagnosis);
@@ -267,13 +267,13 @@ static void it_stops_when_its_caller_says_so(void **state)
     for (int stop_at = 1; stop_at <= 4; stop_at++) {
         struct told told = {.stop_at = stop_at};
         assert_int_equal(gib_diagnosis_start(f->diagnosis, &config), GIB_OK);
-        assert_int_equal(gib_diagnosis_step(f->diagnosis, tell, &told), GIB_ERR_ABORTED);
+        assert_int_equal(gib_diagnosis_run(f->diagnosis, tell, &told), GIB_ERR_ABORTED);
         assert_int_equal(told.calls, stop_at);
         assert_int_equal(gib_diagnosis_result(f->diagnosis, &report), GIB_ERR_STATE);
     }
     /* And works again after it. */
     assert_int_equal(gib_diagnosis_start(f->diagnosis, &config), GIB_OK);
-    assert_int_equal(gib_diagnosis_step(f->diagnosis, NULL, NULL), GIB_DONE);
+    assert_int_equal(gib_diagnosis_run(f->diagnosis, NULL, NULL), GIB_DONE);
 }
 
 static int32_t wait_for_abort(void *user, double share, const char *stage)
@@ -294,7 +294,7 @@ struct other_thread {
 static void *work(void *user)
 {
     struct other_thread *thread = user;
-    thread->status = gib_diagnosis_step(thread->f->diagnosis, wait_for_abort, (void *)&thread->begun);
+    thread->status = gib_diagnosis_run(thread->f->diagnosis, wait_for_abort, (void *)&thread->begun);
     return NULL;
 }
 

@@ -2086,7 +2086,7 @@ typedef struct gib_diagnosis_config {
  * It is called from threads that gib starts for the work, one call at a time; it must return, and may call
  * gib_diagnosis_abort and no other function of that instance.
  *
- * @param user what was given to gib_diagnosis_step.
+ * @param user what was given to gib_diagnosis_run.
  * @param share of the work that is done, 0 to 1, never falling.
  * @param stage what is being done, in a few words; valid during the call.
  */
@@ -4335,9 +4335,9 @@ typedef struct gib_api_table {
      */
     int32_t (*diagnosis_start)(struct gib_diagnosis *handle, const struct gib_diagnosis_config *config);
     /**
-     * See gib_diagnosis_step.
+     * See gib_diagnosis_run.
      */
-    int32_t (*diagnosis_step)(struct gib_diagnosis *handle, gib_diagnosis_progress progress, void *user);
+    int32_t (*diagnosis_run)(struct gib_diagnosis *handle, gib_diagnosis_progress progress, void *user);
     /**
      * See gib_diagnosis_abort.
      */
@@ -4841,7 +4841,7 @@ struct gib_diagnosis *gib_diagnosis_new(void);
 void gib_diagnosis_free(struct gib_diagnosis *handle);
 
 /**
- * Takes the configuration and reads the recordings; `gib_diagnosis_step` then does the work.
+ * Takes the configuration and reads the recordings; `gib_diagnosis_run` then does the work.
  *
  * Recordings are read here, on the calling thread: never call it from a servo thread.
  *
@@ -4876,12 +4876,12 @@ int32_t gib_diagnosis_start(struct gib_diagnosis *handle,
  * `handle` is NULL or an instance; `progress` is NULL or a function that may be called with `user` from other threads
  * until this call returns.
  */
-int32_t gib_diagnosis_step(struct gib_diagnosis *handle,
-                           gib_diagnosis_progress progress,
-                           void *user);
+int32_t gib_diagnosis_run(struct gib_diagnosis *handle,
+                          gib_diagnosis_progress progress,
+                          void *user);
 
 /**
- * Stops a diagnosis that another thread works at: its `gib_diagnosis_step` returns GIB_ERR_ABORTED soon.
+ * Stops a diagnosis that another thread works at: its `gib_diagnosis_run` returns GIB_ERR_ABORTED soon.
  *
  * @param handle the instance.
  * @return GIB_OK, also when nothing is running; GIB_ERR_NULL, GIB_ERR_HANDLE.
@@ -4898,7 +4898,7 @@ int32_t gib_diagnosis_abort(struct gib_diagnosis *handle);
  *
  * @param handle the instance.
  * @param report receives it; zeroed on an error.
- * @return GIB_OK; GIB_ERR_STATE before a `gib_diagnosis_step` is done, or while another thread works; GIB_ERR_NULL,
+ * @return GIB_OK; GIB_ERR_STATE before a `gib_diagnosis_run` is done, or while another thread works; GIB_ERR_NULL,
  * GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
  *
  * [thread: setup] [real-time: no] [state: done]
@@ -4918,7 +4918,7 @@ int32_t gib_diagnosis_result(const struct gib_diagnosis *handle,
  * @param json receives the text, UTF-8, with its NUL; NULL to ask for the size alone.
  * @param size bytes at `json`.
  * @param needed receives the bytes for all of it with its NUL; may be NULL.
- * @return GIB_OK; GIB_ERR_BUFFER when `size` is too small; GIB_ERR_STATE before a `gib_diagnosis_step` is done, or while
+ * @return GIB_OK; GIB_ERR_BUFFER when `size` is too small; GIB_ERR_STATE before a `gib_diagnosis_run` is done, or while
  * another thread works; GIB_ERR_NULL, GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
  *
  * [thread: setup] [real-time: no] [state: done]
@@ -4936,7 +4936,7 @@ int32_t gib_diagnosis_json(const struct gib_diagnosis *handle,
  *
  * @param handle the instance.
  * @param machine receives it; may be the one that the diagnosis was started with.
- * @return GIB_OK; GIB_ERR_STATE before a `gib_diagnosis_step` is done, or while another thread works; GIB_ERR_NULL,
+ * @return GIB_OK; GIB_ERR_STATE before a `gib_diagnosis_run` is done, or while another thread works; GIB_ERR_NULL,
  * GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
  *
  * [thread: setup] [real-time: no] [state: done]
@@ -5691,7 +5691,7 @@ int32_t gib_program_last_error(const struct gib_program *handle,
  * @return GIB_OK; GIB_ERR_BUFFER when `size` is too small (then as much as fits is written); GIB_ERR_NULL,
  * GIB_ERR_HANDLE.
  *
- * [thread: setup] [real-time: yes] [state: any]
+ * [thread: setup] [real-time: no] [state: any]
  *
  * # Safety
  * `handle` is NULL or an instance; `text` is NULL or points to `size` writable bytes.
@@ -6045,7 +6045,7 @@ void gib_tilt_free(struct gib_tilt *handle);
  * GIB_ERR_TILT_TABLE for a table that is too short or does not rise, GIB_ERR_TILT_CONDITION for a table of another
  * condition, GIB_ERR_STATE while busy, GIB_ERR_NULL, GIB_ERR_HANDLE.
  *
- * [thread: setup, or cycle between steps] [real-time: yes] [state: not busy]
+ * [thread: setup] [real-time: no] [state: not busy]
  *
  * # Safety
  * `handle` is NULL or an instance; `config` and `table` are NULL or point to their `struct_size` readable bytes.
@@ -6130,7 +6130,7 @@ int32_t gib_tilt_last_error(const struct gib_tilt *handle, struct gib_error_deta
  * @param detail receives what was wrong; may be NULL.
  * @return GIB_OK; GIB_ERR_CONFIG, GIB_ERR_TILT_TABLE when all rows are used, GIB_ERR_STRUCT_SIZE, GIB_ERR_NULL.
  *
- * [thread: setup] [real-time: yes] [state: none]
+ * [thread: setup] [real-time: no] [state: none]
  *
  * # Safety
  * `table` is NULL or points to a whole `gib_tilt_table`; `detail` is NULL or writable.
@@ -6149,7 +6149,7 @@ int32_t gib_tilt_table_add(struct gib_tilt_table *table,
  * @param detail receives what was wrong: the column, the value, and what it must be above; may be NULL.
  * @return GIB_OK; GIB_ERR_TILT_TABLE, GIB_ERR_CONFIG, GIB_ERR_STRUCT_SIZE, GIB_ERR_NULL.
  *
- * [thread: setup] [real-time: yes] [state: none]
+ * [thread: setup] [real-time: no] [state: none]
  *
  * # Safety
  * `table` is NULL or points to its `struct_size` readable bytes; `detail` is NULL or writable.
@@ -6202,7 +6202,7 @@ int32_t gib_tilt_table_load(struct gib_tilt_table *table,
  * @param detail receives what was wrong; may be NULL.
  * @return GIB_OK; GIB_ERR_TILT_RANGE for a load outside the table, GIB_ERR_CONFIG, and as gib_tilt_table_check.
  *
- * [thread: any] [real-time: yes] [state: none]
+ * [thread: any] [real-time: no] [state: none]
  *
  * # Safety
  * `table` is NULL or points to its `struct_size` readable bytes; `position_mm` and `load` are NULL or two numbers each;

@@ -337,8 +337,8 @@ pub struct GibApiTable {
     pub diagnosis_free: unsafe extern "C" fn(handle: *mut GibDiagnosis),
     /// See gib_diagnosis_start.
     pub diagnosis_start: unsafe extern "C" fn(handle: *mut GibDiagnosis, config: *const GibDiagnosisConfig) -> i32,
-    /// See gib_diagnosis_step.
-    pub diagnosis_step:
+    /// See gib_diagnosis_run.
+    pub diagnosis_run:
         unsafe extern "C" fn(handle: *mut GibDiagnosis, progress: GibDiagnosisProgress, user: *mut c_void) -> i32,
     /// See gib_diagnosis_abort.
     pub diagnosis_abort: unsafe extern "C" fn(handle: *mut GibDiagnosis) -> i32,

@@ -30,7 +30,7 @@ pub const GIB_DIAGNOSIS_INSUFFICIENT_DATA: i32 = 4;
 /// It is called from threads that gib starts for the work, one call at a time; it must return, and may call
 /// gib_diagnosis_abort and no other function of that instance.
 ///
-/// @param user what was given to gib_diagnosis_step.
+/// @param user what was given to gib_diagnosis_run.
 /// @param share of the work that is done, 0 to 1, never falling.
 /// @param stage what is being done, in a few words; valid during the call.
 pub type GibDiagnosisProgress =
@@ -170,7 +170,7 @@ pub unsafe extern "C" fn gib_diagnosis_free(handle: *mut GibDiagnosis) {
     unsafe { super::guard::release(handle) }
 }
 
-/// Takes the configuration and reads the recordings; `gib_diagnosis_step` then does the work.
+/// Takes the configuration and reads the recordings; `gib_diagnosis_run` then does the work.
 ///
 /// Recordings are read here, on the calling thread: never call it from a servo thread.
 ///
@@ -226,7 +226,7 @@ pub unsafe extern "C" fn gib_diagnosis_start(handle: *mut GibDiagnosis, config: 
 /// `handle` is NULL or an instance; `progress` is NULL or a function that may be called with `user` from other threads
 /// until this call returns.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn gib_diagnosis_step(
+pub unsafe extern "C" fn gib_diagnosis_run(
     handle: *mut GibDiagnosis,
     progress: GibDiagnosisProgress,
     user: *mut c_void,
@@ -258,7 +258,7 @@ struct Told {
     user: *mut c_void,
 }
 
-// SAFETY: the caller of gib_diagnosis_step promises that `progress` may be called with `user` from other threads.
+// SAFETY: the caller of gib_diagnosis_run promises that `progress` may be called with `user` from other threads.
 unsafe impl Sync for Told {}
 
 impl Told {
@@ -272,7 +272,7 @@ impl Told {
     }
 }
 
-/// Stops a diagnosis that another thread works at: its `gib_diagnosis_step` returns GIB_ERR_ABORTED soon.
+/// Stops a diagnosis that another thread works at: its `gib_diagnosis_run` returns GIB_ERR_ABORTED soon.
 ///
 /// @param handle the instance.
 /// @return GIB_OK, also when nothing is running; GIB_ERR_NULL, GIB_ERR_HANDLE.
@@ -297,7 +297,7 @@ pub unsafe extern "C" fn gib_diagnosis_abort(handle: *mut GibDiagnosis) -> i32 {
 ///
 /// @param handle the instance.
 /// @param report receives it; zeroed on an error.
-/// @return GIB_OK; GIB_ERR_STATE before a `gib_diagnosis_step` is done, or while another thread works; GIB_ERR_NULL,
+/// @return GIB_OK; GIB_ERR_STATE before a `gib_diagnosis_run` is done, or while another thread works; GIB_ERR_NULL,
 /// GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
 ///
 /// [thread: setup] [real-time: no] [state: done]
@@ -344,7 +344,7 @@ fn number(verdict: Verdict) -> i32 {
 /// @param json receives the text, UTF-8, with its NUL; NULL to ask for the size alone.
 /// @param size bytes at `json`.
 /// @param needed receives the bytes for all of it with its NUL; may be NULL.
-/// @return GIB_OK; GIB_ERR_BUFFER when `size` is too small; GIB_ERR_STATE before a `gib_diagnosis_step` is done, or while
+/// @return GIB_OK; GIB_ERR_BUFFER when `size` is too small; GIB_ERR_STATE before a `gib_diagnosis_run` is done, or while
 /// another thread works; GIB_ERR_NULL, GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
 ///
 /// [thread: setup] [real-time: no] [state: done]
@@ -371,7 +371,7 @@ pub unsafe extern "C" fn gib_diagnosis_json(
 ///
 /// @param handle the instance.
 /// @param machine receives it; may be the one that the diagnosis was started with.
-/// @return GIB_OK; GIB_ERR_STATE before a `gib_diagnosis_step` is done, or while another thread works; GIB_ERR_NULL,
+/// @return GIB_OK; GIB_ERR_STATE before a `gib_diagnosis_run` is done, or while another thread works; GIB_ERR_NULL,
 /// GIB_ERR_HANDLE, GIB_ERR_INTERNAL.
 ///
 /// [thread: setup] [real-time: no] [state: done]

@@ -136,7 +136,7 @@ static API: GibApiTable = GibApiTable {
     diagnosis_new: gib_diagnosis_new,
     diagnosis_free: gib_diagnosis_free,
     diagnosis_start: gib_diagnosis_start,
-    diagnosis_step: gib_diagnosis_step,
+    diagnosis_run: gib_diagnosis_run,
     diagnosis_abort: gib_diagnosis_abort,
     diagnosis_result: gib_diagnosis_result,
     diagnosis_json: gib_diagnosis_json,

@@ -291,7 +291,7 @@ pub unsafe extern "C" fn gib_program_last_error(handle: *const GibProgram, detai
 /// @return GIB_OK; GIB_ERR_BUFFER when `size` is too small (then as much as fits is written); GIB_ERR_NULL,
 /// GIB_ERR_HANDLE.
 ///
-/// [thread: setup] [real-time: yes] [state: any]
+/// [thread: setup] [real-time: no] [state: any]
 ///
 /// # Safety
 /// `handle` is NULL or an instance; `text` is NULL or points to `size` writable bytes.

@@ -116,7 +116,7 @@ pub unsafe extern "C" fn gib_tilt_free(handle: *mut GibTilt) {
 /// GIB_ERR_TILT_TABLE for a table that is too short or does not rise, GIB_ERR_TILT_CONDITION for a table of another
 /// condition, GIB_ERR_STATE while busy, GIB_ERR_NULL, GIB_ERR_HANDLE.
 ///
-/// [thread: setup, or cycle between steps] [real-time: yes] [state: not busy]
+/// [thread: setup] [real-time: no] [state: not busy]
 ///
 /// # Safety
 /// `handle` is NULL or an instance; `config` and `table` are NULL or point to their `struct_size` readable bytes.
@@ -302,7 +302,7 @@ unsafe fn named<'a>(path: *const c_char) -> Result<&'a Path, Fault> {
 /// @param detail receives what was wrong; may be NULL.
 /// @return GIB_OK; GIB_ERR_CONFIG, GIB_ERR_TILT_TABLE when all rows are used, GIB_ERR_STRUCT_SIZE, GIB_ERR_NULL.
 ///
-/// [thread: setup] [real-time: yes] [state: none]
+/// [thread: setup] [real-time: no] [state: none]
 ///
 /// # Safety
 /// `table` is NULL or points to a whole `gib_tilt_table`; `detail` is NULL or writable.
@@ -333,7 +333,7 @@ pub unsafe extern "C" fn gib_tilt_table_add(
 /// @param detail receives what was wrong: the column, the value, and what it must be above; may be NULL.
 /// @return GIB_OK; GIB_ERR_TILT_TABLE, GIB_ERR_CONFIG, GIB_ERR_STRUCT_SIZE, GIB_ERR_NULL.
 ///
-/// [thread: setup] [real-time: yes] [state: none]
+/// [thread: setup] [real-time: no] [state: none]
 ///
 /// # Safety
 /// `table` is NULL or points to its `struct_size` readable bytes; `detail` is NULL or writable.
@@ -408,7 +408,7 @@ pub unsafe extern "C" fn gib_tilt_table_load(
 /// @param detail receives what was wrong; may be NULL.
 /// @return GIB_OK; GIB_ERR_TILT_RANGE for a load outside the table, GIB_ERR_CONFIG, and as gib_tilt_table_check.
 ///
-/// [thread: any] [real-time: yes] [state: none]
+/// [thread: any] [real-time: no] [state: none]
 ///
 /// # Safety
 /// `table` is NULL or points to its `struct_size` readable bytes; `position_mm` and `load` are NULL or two numbers each;

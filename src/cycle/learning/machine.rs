@@ -397,7 +397,7 @@ impl Learning {
         let back = place.read(&self.tables[(self.front ^ 1) & 1]);
         let correction = self.presence * (front + self.blend * (back - front));
         let most = self.plan.slope;
-        self.correction += (correction - self.correction).clamp(-most, most);
+        self.correction += (correction - self.correction).max(-most).min(most);
         self.correction = (self.correction + 1e-10) - 1e-10;
         self.command = target + 1e-3 * f64::from(self.correction);
         self.end_of_stopping();
@@ -406,7 +406,7 @@ impl Learning {
     /// A cycle of fading out without a target to put it on.
     fn fade_out(&mut self) {
         self.presence = (self.presence - self.plan.fade).max(0.0);
-        self.correction -= self.correction.clamp(-self.plan.slope, self.plan.slope);
+        self.correction -= self.correction.max(-self.plan.slope).min(self.plan.slope);
         self.end_of_stopping();
     }
 

@@ -95,7 +95,7 @@ impl Plan {
         let published = whole("method\0", c.method, 0.0, 0.0, 1.0)? != 0.0;
         let fewest = if published { 16.0 } else { f64::max(16.0, 4.0 * harmonics) };
         let points = whole("points\0", c.points, 256.0, fewest, GIB_LEARNING_POINTS as f64)?;
-        if points % 2.0 != 0.0 {
+        if points as u32 & 1 != 0 {
             let high = GIB_LEARNING_POINTS as f64;
             return Err(Fault { code: GIB_ERR_CONFIG, field: "points\0", value: points, low: fewest, high });
         }

@@ -70,7 +70,9 @@ fn cross(a: &Vector, b: &Vector) -> Vector {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// `v` turned about the unit vector `u` by an angle in rad (Rodrigues).
+/// `v` turned about the unit vector `u` by an angle in rad (Rodrigues). Never inlined: the sine is then called by its name,
+/// which the proof of real time can follow.
+#[inline(never)]
 fn turned(v: &Vector, u: &Vector, angle: f64) -> Vector {
     let (sin, cos) = (angle.sin(), angle.cos());
     let (side, along) = (cross(u, v), dot(u, v) * (1.0 - cos));
@@ -111,11 +113,16 @@ impl Search {
         search
     }
 
+    /// The axes with their angles. The second axis is carried by the first, so it turns first.
+    fn inner_first(&self) -> [(&Axis, f64); 2] {
+        let ([first, second], [by_first, by_second]) = (&self.axes, self.angles);
+        [(second, by_second), (first, by_first)]
+    }
+
     /// A vector that belongs to the workpiece or to the tool, turned by the axes that turn that side.
     fn turned(&self, v: &Vector, tool: bool) -> Vector {
-        // The second axis is carried by the first, so it turns first.
         let mut v = *v;
-        for (axis, angle) in self.axes.iter().zip(self.angles).rev() {
+        for (axis, angle) in self.inner_first() {
             if axis.present && axis.turns_tool == tool {
                 v = turned(&v, &axis.direction, angle);
             }
@@ -126,7 +133,7 @@ impl Search {
     /// How a point of that side moves, when x y z stand.
     fn moved(&self, point: &Vector, tool: bool) -> Vector {
         let mut p = *point;
-        for (axis, angle) in self.axes.iter().zip(self.angles).rev() {
+        for (axis, angle) in self.inner_first() {
             if axis.present && axis.turns_tool == tool {
                 p = plus(&axis.pivot, &turned(&minus(&p, &axis.pivot), &axis.direction, angle));
             }
@@ -151,8 +158,7 @@ impl Search {
         if both * both > REACH * REACH {
             by = [(left[0] * b[1] - left[1] * b[0]) / both, (a[0] * left[1] - a[1] * left[0]) / both];
         } else if aa.max(bb) > REACH * REACH {
-            let better = usize::from(bb > aa);
-            by[better] = along(if bb > aa { &b } else { &a });
+            by = if bb > aa { [0.0, along(&b)] } else { [along(&a), 0.0] };
         }
         self.angles[0] += by[0];
         self.angles[1] += by[1];
@@ -163,9 +169,9 @@ impl Search {
     #[must_use]
     pub fn offsets(&self, point: &Vector, tool_centre_point: bool) -> Offsets {
         let mut offsets = Offsets::default();
-        for (axis, angle) in self.axes.iter().zip(self.angles) {
-            if axis.present {
-                offsets.angular[axis.letter] += axis.sense * angle.to_degrees();
+        for (axis, angle) in self.inner_first() {
+            if let Some(letter) = offsets.angular.get_mut(axis.letter).filter(|_| axis.present) {
+                *letter += axis.sense * angle.to_degrees();
             }
         }
         let normal = self.turned(&self.normal, false);

@@ -3,7 +3,7 @@
 use super::*;
 use crate::cycle::calibration::solve::Complex;
 use crate::cycle::learning::points::{angle, close};
-use crate::cycle::turns::cos_sin;
+use crate::cycle::turns::{cos_sin, fold};
 use crate::cycle::vibration::spindle::Wheel;
 use core::f64::consts::TAU;
 
@@ -124,9 +124,12 @@ impl Learning {
     /// Published: each point by the deviation that it led to.
     fn update_point(&mut self, i: usize) {
         let points = self.plan.points.max(1) as i64;
-        let lead = (self.lead() * self.plan.scale + 0.5).floor() as i64;
-        let led = (i as i64 + lead).rem_euclid(points) as usize;
-        let seen = self.seen.get(led).copied().unwrap_or(0.0);
+        // Whole turns of lead change nothing; what is left is half a turn at most, so that one turn back or forth suffices.
+        let lead = (fold(self.lead()) * self.plan.scale + 0.5).floor() as i64;
+        let led = i as i64 + lead;
+        let led = if led < 0 { led + points } else { led };
+        let led = if led >= points { led - points } else { led };
+        let seen = usize::try_from(led).ok().and_then(|led| self.seen.get(led)).copied().unwrap_or(0.0);
         let now = self.tables[self.front & 1].get(i).map_or(0.0, |cell| cell.value);
         let Some(best) = self.best.get_mut(i) else { return };
         if self.better {
@@ -134,7 +137,7 @@ impl Learning {
         }
         let most = self.plan.most;
         let next = if self.last_update { *best } else { now + self.plan.gain as f32 * seen };
-        let next = next.clamp(-most, most);
+        let next = next.max(-most).min(most);
         self.report.correction_um = self.report.correction_um.max(next.abs().into());
         if let Some(cell) = self.tables[(self.front ^ 1) & 1].get_mut(i) {
             cell.value = (next + 1e-10) - 1e-10;

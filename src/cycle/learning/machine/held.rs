@@ -44,7 +44,8 @@ impl Learning {
             self.report.correction_um = self.report.correction_um.max(value.abs().into());
         }
         for i in 0..count {
-            let (before, after) = (table[(i + count - 1) % count].value, table[(i + 1) % count].value);
+            let (before, after) = (if i == 0 { count - 1 } else { i - 1 }, if i + 1 == count { 0 } else { i + 1 });
+            let (before, after) = (table[before].value, table[after].value);
             table[i].slope = 0.5 * (after - before);
         }
         close(table, count);
