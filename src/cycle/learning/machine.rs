@@ -301,7 +301,7 @@ impl Learning {
     fn turn(&mut self, angle_deg: f64) -> f64 {
         let angle = fold(angle_deg * (1.0 / 360.0));
         // 0 in the first cycle, and no number where the angle is none.
-        let turned = if self.known { fold(angle - self.angle) } else { angle - angle };
+        let turned = if self.known { fold(angle - self.angle) } else { 0.0 * angle };
         self.reasons = 0;
         if turned.abs() <= self.plan.turn_max {
             self.known = true;
