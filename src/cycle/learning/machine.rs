@@ -448,7 +448,8 @@ impl Learning {
         }
     }
 
-    /// What the output says in a phase that is not the usual one.
+    /// What the output says in a phase that is not the usual one. Apart, so that no arm of it is left out and trapped.
+    #[inline(never)]
     fn explain(&self, output: &mut LearningOutput) {
         output.status = self.status();
         output.phase = match self.phase {
