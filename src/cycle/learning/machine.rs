@@ -448,26 +448,29 @@ impl Learning {
         }
     }
 
-    /// What the output says in a phase that is not the usual one. Apart, so that no arm of it is left out and trapped.
+    /// What the output says in a phase that is not the usual one.
     #[inline(never)]
     fn explain(&self, output: &mut LearningOutput) {
-        output.status = self.status();
-        output.phase = match self.phase {
-            Phase::Idle => GIB_LEARNING_IDLE,
-            Phase::Settle if self.reasons != 0 => GIB_LEARNING_WAITING,
-            Phase::Settle => GIB_LEARNING_SETTLE,
-            Phase::Measure => GIB_LEARNING_MEASURE,
-            Phase::Analyse | Phase::Update | Phase::Synthesise | Phase::Smooth => GIB_LEARNING_EVALUATE,
-            Phase::Blend => GIB_LEARNING_BLEND,
-            Phase::Done => GIB_LEARNING_DONE,
-            Phase::Stopping => GIB_LEARNING_STOPPING,
-            Phase::Failed => GIB_LEARNING_FAILED,
+        // One match for both: a second one would leave the arms that the first has taken as traps.
+        (output.status, output.phase) = match self.phase {
+            Phase::Idle => (GIB_OK, GIB_LEARNING_IDLE),
+            Phase::Settle if self.reasons != 0 => (GIB_BUSY, GIB_LEARNING_WAITING),
+            Phase::Settle => (GIB_BUSY, GIB_LEARNING_SETTLE),
+            Phase::Measure => (GIB_BUSY, GIB_LEARNING_MEASURE),
+            Phase::Analyse | Phase::Update | Phase::Synthesise | Phase::Smooth => (GIB_BUSY, GIB_LEARNING_EVALUATE),
+            Phase::Blend => (GIB_BUSY, GIB_LEARNING_BLEND),
+            Phase::Done => (GIB_DONE, GIB_LEARNING_DONE),
+            Phase::Stopping => (GIB_BUSY, GIB_LEARNING_STOPPING),
+            Phase::Failed => (self.fault.code, GIB_LEARNING_FAILED),
         };
-        output.message = match self.phase {
-            Phase::Stopping | Phase::Failed => self.fault.code,
-            _ if self.reasons & GIB_LEARNING_BAD_ANGLE != 0 => GIB_ERR_LEARNING_ANGLE,
-            _ if self.reasons & GIB_LEARNING_NOT_DETECTED != 0 => GIB_ERR_LEARNING_DETECTED,
-            _ => GIB_OK,
+        output.message = if output.phase == GIB_LEARNING_STOPPING || output.phase == GIB_LEARNING_FAILED {
+            self.fault.code
+        } else if self.reasons & GIB_LEARNING_BAD_ANGLE != 0 {
+            GIB_ERR_LEARNING_ANGLE
+        } else if self.reasons & GIB_LEARNING_NOT_DETECTED != 0 {
+            GIB_ERR_LEARNING_DETECTED
+        } else {
+            GIB_OK
         };
     }
 }
