@@ -1,7 +1,7 @@
 #!/bin/sh
 # The harness under AddressSanitizer and UBSan, library included, and under valgrind's memcheck.
 #
-#   checked_memory.sh sanitizers TEST...     names of test programs, without .c
+#   checked_memory.sh sanitizers TEST...     names of test programs, without .c; HELPERS: names of what they share
 #   checked_memory.sh memcheck PROGRAM...    programs that are built already
 #
 # A fault put in on purpose must be caught first; then the programs must be clean. A tool that is not here is named.
@@ -59,11 +59,12 @@ if ! RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=address -Cdebug-assertions=on -Cov
     exit 1
 fi
 library=$root/build/asan/$target/release/libgib.a
-helpers=
-for file in plant.c *_plant.c; do
-    [ ! -e "$file" ] || helpers="$helpers $file"
+rm -f "$out/helpers.a"
+for helper in $HELPERS; do
+    clang $flags -c "$helper.c" -o "$out/$helper.o"
+    ar rcs "$out/helpers.a" "$out/$helper.o"
 done
-build() { clang $flags "$1.c" $helpers "$library" -lcmocka -lm -lpthread -ldl -o "$out/$1"; }
+build() { clang $flags "$1.c" "$out/helpers.a" "$library" -lcmocka -lm -lpthread -ldl -o "$out/$1"; }
 
 build seeded_memory_fault
 caught "$out/seeded_memory_fault" overread
