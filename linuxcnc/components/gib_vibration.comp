@@ -19,6 +19,7 @@ pin in bit on "correct the position";
 pin out float position "where the tool is against the workpiece, mm";
 pin out float correction "what is added to the scale, um";
 pin out float blend "share of the correction in force, 0 to 1";
+pin out bit in_force = false "the correction is wholly in force: position can be trusted";
 pin out s32 state = 0 "GIB_VIBRATION_ phase";
 pin out u32 why = 0 "why the plain scale is in force, a sum";
 pin out s32 error = 0 "0, or the gib status of the last start or end";
@@ -94,5 +95,6 @@ FUNCTION(_)
         state = out.phase;
         why = out.reasons;
     }
+    in_force = running && good && blend == 1.0;
     ok = ok_in && good;
 }

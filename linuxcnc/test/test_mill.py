@@ -70,6 +70,10 @@ def mdi(line, seconds=60):
     wait(idle, seconds, line)
 
 
+def rms(values):
+    return math.sqrt(sum(value * value for value in values) / len(values))
+
+
 def machine_on():
     command.state(linuxcnc.STATE_ESTOP_RESET)
     command.wait_complete()
@@ -105,6 +109,7 @@ def counted():
     time.sleep(3)
     mdi("M113 P20 Q2")
     hal.set_p("gib-vibration.0.on", "1")
+    hal.set_p("gib-learning.0.on", "1")
     command.mdi("G1 X60 Y60 Z60 F200")
     wait(lambda: pin("gib-inertia.0.varying"), 30, "the speed varies")
     rtapi = subprocess.run(["pgrep", "-f", "bin/rtapi_counted"], capture_output=True, text=True, check=True).stdout.split()[0]
@@ -424,7 +429,7 @@ def vibration_corrected():
     scale, corrected, true = columns(path, "x.table_position_mm", "work.corrected_position_mm", "work.true_position_mm")
 
     def error(position):
-        return 1e3 * math.sqrt(sum((a - b) ** 2 for a, b in zip(position, true)) / len(true))
+        return 1e3 * rms([a - b for a, b in zip(position, true)])
     check(error(scale) > 5 and error(corrected) < 0.1 * error(scale),
           f"position of the tool is wrong by {error(scale):.2f} um RMS on the scale, {error(corrected):.2f} corrected")
     hal.set_p("gib-vibration.0.on", "0")
@@ -433,8 +438,38 @@ def vibration_corrected():
     mdi("M5")
 
 
+def swing_learnt():
+    """A slide without friction is told where to be so that the tool stands still against the workpiece."""
+    of = "gib-sim-axis.0."
+    kept = {name: pin(of + name) for name in ("clearance", "friction")}
+    for name in kept:
+        hal.set_p(of + name, "0")
+    mdi("G0 X30")
+
+    def swing():
+        place = [row[0] for row in zip(*columns(recorded(lambda: mdi("G4 P1.5")), "work.true_position_mm"))]
+        mean = sum(place) / len(place)
+        return 1e3 * rms([at - mean for at in place])
+    told()
+    mdi("M120 P1")
+    text = told()
+    check("spindle stands" in text and not pin("gib-learning.0.on"), f"M120 is refused: {text}")
+    mdi("M3 S600")
+    mdi("G4 P1.5")
+    before = swing()
+    mdi("M120 P1", 120)
+    text, after = told(), swing()
+    check(pin("gib-learning.0.done") and after < 0.15 * before,
+          f"the tool swings against the workpiece by {before:.2f} um RMS, {after:.2f} with the learnt command; {text}")
+    mdi("M120 P0")
+    check(pin("gib-learning.0.correction") == 0 and not pin("gib-learning.0.busy"), "M120 P0 takes it out again")
+    mdi("M5")
+    for name, value in kept.items():
+        hal.set_p(of + name, str(value))
+
+
 TESTS = [homing, refused, inertia_and_variation, lost_motion_measured, abort_restores, put_back, diagnosed,
-         tilt_followed, vibration_corrected, no_number_reaches_motion]
+         tilt_followed, vibration_corrected, swing_learnt, no_number_reaches_motion]
 
 
 def main(names):
