@@ -12,6 +12,9 @@ use gib::recording::{Recording, Signal, Unit};
 
 use super::{Answer, Result, machine_file};
 
+/// Some five hours at 4 kHz, and 4 GB.
+const MOST_CYCLES: f64 = 7e7;
+
 /// Simulates an axis under its servo and writes what a recorder would have seen
 ///
 /// The same seed gives the same file. Lengths are mm, on a rotary axis degrees.
@@ -26,6 +29,9 @@ pub struct Simulate {
     /// Where the recording is written, CSV
     #[arg(long)]
     out: PathBuf,
+    /// Do the moves so many times over (not a trajectory)
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    repeat: u32,
     /// Seed of the noise and of the phases of periodic effects
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -112,16 +118,31 @@ impl Simulate {
             "csv" => trajectory(file, axis, period_s),
             "json" => {
                 let text = std::fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?;
-                Ok(Moves::parse(&text).map_err(|e| format!("{}: {e}", file.display()))?.command(period_s))
+                let moves = Moves::parse(&text).map_err(|e| format!("{}: {e}", file.display()))?;
+                self.repeated(moves, period_s)
             }
             _ => {
                 let reach = self.reach(axis)?;
                 let moves = Moves::built_in(&self.moves, &reach).ok_or_else(|| {
                     format!("--moves {}: give one of {}, or a .json or .csv file", self.moves, BUILT_IN.join(", "))
                 })?;
-                Ok(moves.command(period_s))
+                self.repeated(moves, period_s)
             }
         }
+    }
+
+    /// The cycles of these moves, over and over.
+    fn repeated(&self, mut moves: Moves, period_s: f64) -> std::result::Result<Vec<f64>, Box<dyn std::error::Error>> {
+        let cycles = moves.duration_s() * f64::from(self.repeat) / period_s;
+        if cycles > MOST_CYCLES {
+            return Err(format!(
+                "--moves {}: takes {cycles:.3e} servo cycles; at most {MOST_CYCLES:.0e} are simulated at once",
+                self.moves
+            )
+            .into());
+        }
+        moves.moves = moves.moves.repeat(self.repeat as usize);
+        Ok(moves.command(period_s))
     }
 
     fn reach(&self, axis: &Axis) -> std::result::Result<Reach, String> {

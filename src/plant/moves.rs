@@ -113,6 +113,22 @@ impl Moves {
         Some(Moves { schema: SCHEMA.into(), axis: None, start_mm: reach.start, moves })
     }
 
+    /// How long all of it takes, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        let mut at = self.start_mm;
+        let seconds = self.moves.iter().map(|m| match *m {
+            Move::To { to_mm, speed_mm_s, acceleration_mm_s2, jerk_mm_s3 } => {
+                let travel = to_mm - std::mem::replace(&mut at, to_mm);
+                let rounding = jerk_mm_s3.map_or(0.0, |jerk| acceleration_mm_s2 / jerk);
+                Trapezoid::new(travel, speed_mm_s, acceleration_mm_s2).duration() + rounding
+            }
+            Move::Dwell { dwell_s } => dwell_s,
+            Move::Sweep { duration_s, .. } => duration_s,
+        });
+        seconds.sum()
+    }
+
     /// The commanded position of every servo cycle.
     #[must_use]
     pub fn command(&self, period_s: f64) -> Vec<f64> {
@@ -312,7 +328,11 @@ mod tests {
             assert!(most(&command, 1, 1e-3) <= 200.0 * 1.01, "{name}");
             assert!(most(&command, 2, 1e-3) <= 2000.0 * 1.1, "{name}: {}", most(&command, 2, 1e-3));
         }
-        let command = Moves::built_in("test", &REACH).unwrap().command(1e-3);
+        let moves = Moves::built_in("test", &REACH).unwrap();
+        let command = moves.command(1e-3);
+        let seconds = (command.len() - 1) as f64 * 1e-3;
+        // A move takes a whole number of cycles, and one more to settle.
+        assert!((seconds - moves.duration_s()).abs() < 3e-3 * moves.moves.len() as f64, "{seconds}");
         assert!(most(&command, 1, 1e-3) > 199.0 && most(&command, 2, 1e-3) > 1900.0);
         assert!(Moves::built_in("nothing", &REACH).is_none());
     }
