@@ -13,7 +13,7 @@ use crate::cycle::tilt::machine::Tilt;
 use crate::cycle::tilt::plan::Plan;
 use crate::cycle::tilt::table::{TiltCondition, TiltTable};
 use crate::cycle::tilt::verdict::TiltReport;
-use crate::error::{Fault, status_text};
+use crate::error::{Fault, GIB_ERR_TILT_ALIAS, GIB_ERR_TILT_RANGE, status_text};
 use crate::recording::{Column, Recording, RecordingError, Signal, Unit};
 
 /// What is known beside the recording.
@@ -49,8 +49,26 @@ impl fmt::Display for Error {
             Error::Refused(fault) => fault,
         };
         write!(f, "{}", status_text(fault.code).trim_end_matches('\0'))?;
+        let Fault { code, value, high, .. } = *fault;
         match fault.field.trim_end_matches('\0') {
             "" => Ok(()),
+            "off_condition" => write!(
+                f,
+                ": {value} stretches of 0.1 s in the cut have its feed and another speed, or the speed sways; {high} may. \
+                 Give the cut's own speed and feed, or a wider --tolerance"
+            ),
+            "load" if code == GIB_ERR_TILT_RANGE => {
+                write!(f, ": {value} stretches of 0.1 s; {high} may. Teach shallower and deeper cuts")
+            }
+            "speed_rpm" if code == GIB_ERR_TILT_ALIAS => {
+                write!(f, ": {value} stretches of 0.1 s; {high} may. Record a load in percent, or cut at another speed")
+            }
+            "blocks" => write!(
+                f,
+                ": {value} stretches of 0.1 s in the cut, {} are needed. A row counts where the feed is the condition's: check \
+                 speed, feed and --entry",
+                fault.low
+            ),
             field => write!(f, ": {field} is {:.6}, allowed from {:.6} to {:.6}", fault.value, fault.low, fault.high),
         }
     }

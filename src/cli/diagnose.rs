@@ -152,8 +152,9 @@ fn text(d: &Diagnosis) -> String {
         };
         let _ = writeln!(
             text,
-            "{} error on rows not fitted: {:.4} → {:.4} {unit} RMS, {:.2} times better (95 %: {:.2} to {:.2})",
+            "{} error{} on rows not fitted: {:.4} → {:.4} {unit} RMS, {:.2} times better (95 %: {:.2} to {:.2})",
             gain.channel,
+            if gain.channel.ends_with("position") { "" } else { " while moving," },
             factor * gain.before,
             factor * gain.after,
             gain.before / gain.after.max(1e-300),

@@ -83,7 +83,7 @@ impl<'a> Predicted<'a> {
     }
 
     fn figures(&self) -> Figures {
-        let standing = 0.01 * rms(self.observed.motion.velocity.iter().copied());
+        let standing = self.observed.motion.standing_speed();
         let moving = self.residual().zip(&self.observed.motion.velocity).filter(|(_, v)| v.abs() > standing);
         let measured = &self.observed.position;
         Figures {

@@ -38,15 +38,22 @@ impl Columns {
         };
         let source = |signal: Signal, unit: Unit| {
             let column = recording.column(&axis.name, signal)?;
+            if !column.values.iter().any(|value| value.is_finite()) {
+                let message = "holds no number in any row, and this analysis needs it";
+                return Err(RecordingError::new(&recording.file, message).in_column(&column.name));
+            }
             Ok::<_, RecordingError>(Source { values: &column.values, factor: convert(column, unit)? })
         };
-        let optional = |signal| recording.get(&axis.name, signal).map(|_| source(signal, load)).transpose();
+        let held = |signal| {
+            recording.get(&axis.name, signal).filter(|column| column.values.iter().any(|value| value.is_finite()))
+        };
+        let optional = |signal| held(signal).map(|_| source(signal, load)).transpose();
         let position = source(Signal::Position, load)?;
         let torque = source(torque_signal, torque_unit)?;
         let (table, command) = (optional(Signal::TablePosition)?, optional(Signal::PositionCommand)?);
         let mut whole =
             vec![recording.column(&axis.name, Signal::Position)?, recording.column(&axis.name, torque_signal)?];
-        whole.extend(recording.get(&axis.name, Signal::TablePosition));
+        whole.extend(held(Signal::TablePosition));
         let runs = recording.runs(&whole);
         let rows: usize = runs.iter().map(ExactSizeIterator::len).sum();
         let runs = spread(runs);

@@ -11,7 +11,7 @@ use crate::plant::observed::Observed;
 /// RMS before and after, on rows that were not fitted.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gain {
-    /// `torque` or `force`, `position`, `table_position`.
+    /// `torque` or `force` (while the axis moves), `position`, `table_position`.
     pub channel: &'static str,
     /// RMS of the belief's residual.
     pub before: f64,
@@ -21,7 +21,8 @@ pub struct Gain {
     pub ci95: [f64; 2],
 }
 
-/// Errors of one machine on a recording: torque, closed-loop position, table position; NaN where not predicted.
+/// Errors of one machine on a recording: torque, closed-loop position, table position; NaN where not predicted, and for the
+/// torque where the axis stands, since friction then is not a function of the motion.
 type Errors = [Option<Vec<f64>>; 3];
 
 fn errors(axis: &Axis, observed: &Observed) -> Option<Errors> {
@@ -29,8 +30,12 @@ fn errors(axis: &Axis, observed: &Observed) -> Option<Errors> {
     let less =
         |measured: &[f64], model: &[f64]| -> Vec<f64> { measured.iter().zip(model).map(|(m, p)| m - p).collect() };
     let replayed = prediction.closed_loop.as_ref();
+    let standing = observed.motion.standing_speed();
+    let mut torque = less(&observed.torque, &prediction.torque.torque);
+    let speeds = torque.iter_mut().zip(&observed.motion.velocity);
+    speeds.filter(|(_, v)| !(v.abs() > standing)).for_each(|(error, _)| *error = f64::NAN);
     Some([
-        Some(less(&observed.torque, &prediction.torque.torque)),
+        Some(torque),
         replayed.map(|r| less(&observed.position, &r.position)),
         replayed.zip(observed.table_position.as_ref()).map(|(r, t)| less(t, &r.table_position)),
     ])

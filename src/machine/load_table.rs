@@ -52,7 +52,16 @@ fn signal_name(signal: i32) -> &'static str {
 pub fn save(table: &TiltTable, file: &Path) -> Result<(), Error> {
     table.check().map_err(|fault| {
         let field = fault.field.trim_end_matches('\0');
-        error(fault, format!("{}: not written: {field} is {}, allowed from {}", file.display(), fault.value, fault.low))
+        let row = table.load.iter().position(|load| field == "load" && *load == fault.value);
+        let why = match row.filter(|row| *row > 0) {
+            Some(row) => format!(
+                "the load at {} mm, {:.4}, does not rise enough over the row before, as known: more than {:.4} is needed; \
+                 cut these depths again, or leave one out",
+                table.depth_mm[row], fault.value, fault.low
+            ),
+            None => format!("{field} is {}, allowed from {}", fault.value, fault.low),
+        };
+        error(fault, format!("{}: not written: {why}", file.display()))
     })?;
     let text = format!("{:#}\n", to_json(table));
     super::whole::replace(file, &text)

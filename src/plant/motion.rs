@@ -29,6 +29,16 @@ pub struct Motion {
 pub const FEWEST_ROWS: usize = 16;
 
 impl Motion {
+    /// Speed below which an axis cannot be told from one that stands, load units/s: thrice what the position leaves open, at
+    /// the fastest it is known, and never nothing. Dry friction at rest is not a function of the motion.
+    #[must_use]
+    pub fn standing_speed(&self) -> f64 {
+        let known = self.velocity.iter().filter(|v| v.is_finite());
+        let (sum, n) = known.fold((0.0, 0_u64), |(sum, n), v| (sum + v * v, n + 1));
+        let typical = (sum / n.max(1) as f64).sqrt();
+        (3.0 * std::f64::consts::TAU * self.cutoff_hz * self.resolution).max(1e-6 * typical)
+    }
+
     /// Motion of a whole stretch of rows: times strictly increasing, positions finite. Irregular times are resampled to
     /// their mean period, filtered, and read back at the rows. `None` for fewer than [`FEWEST_ROWS`] rows.
     #[must_use]

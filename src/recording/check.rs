@@ -64,8 +64,12 @@ pub(super) fn checked(file: &str, mut time_s: Vec<f64>, mut columns: Vec<Column>
     let mut issues = Vec::new();
     issues.extend(drop_repeats(file, &mut time_s, &mut columns)?);
     if time_s.len() < 2 {
-        let found = if time_s.is_empty() { "no rows" } else { "only one row" };
-        return Err(RecordingError::new(file, format!("has {found} of data; expected at least two")));
+        let found = match (time_s.is_empty(), issues.is_empty()) {
+            (true, _) => "no rows of data; expected at least two",
+            (false, true) => "only one row of data; expected at least two",
+            (false, false) => "the same time in all its rows; expected times that rise",
+        };
+        return Err(RecordingError::new(file, format!("has {found}")));
     }
     let sampling = Sampling::of(&time_s);
     issues.extend(timing(&time_s, &sampling));

@@ -149,6 +149,7 @@ mod tests {
             (String::new(), vec!["is empty", "header"]),
             (h.to_owned(), vec!["no rows"]),
             (format!("{h}0,1\n"), vec!["one row"]),
+            (format!("{h}0,1\n0,1\n0,1\n"), vec!["same time in all"]),
             ("time_s;x.position_mm\n0;1\n".into(), vec!["row 1", "semicolons"]),
             ("0,1\n1,2\n".into(), vec!["row 1", "header line"]),
             ("x.position_mm,time_s\n0,1\n".into(), vec!["row 1", "time_s must come first"]),

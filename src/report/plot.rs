@@ -51,6 +51,8 @@ pub enum Mark {
     Bars(Vec<(f64, f64, f64)>),
     /// A filled band: (x, low, high).
     Band(Vec<(f64, f64, f64)>),
+    /// A filled column from zero to each point, so wide.
+    Columns(Vec<(f64, f64)>, f64),
 }
 
 /// Marks of one colour under one name.
@@ -214,6 +216,13 @@ fn add(chart: &mut Chart, series: &Series) -> Result<(), PlotError> {
                     finite().map(|p| (p.0, p.1)).chain(finite().rev().map(|p| (p.0, p.2))).collect();
                 Some(chart.draw_series(std::iter::once(Polygon::new(outline, colour.mix(0.18)))).map_err(failed)?)
             }
+            Mark::Columns(points, wide) => {
+                let finite = points.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
+                let column = |p: &(f64, f64)| {
+                    Rectangle::new([(p.0 - 0.5 * wide, 0.0), (p.0 + 0.5 * wide, p.1)], colour.filled())
+                };
+                Some(chart.draw_series(finite.map(column)).map_err(failed)?)
+            }
         };
         if let (Some(annotation), true) = (annotation, i == last && !series.name.is_empty()) {
             let key = move |(x, y): (i32, i32)| Rectangle::new([(x + 2, y - 2), (x + 22, y + 2)], colour.filled());
@@ -231,6 +240,9 @@ impl Panel {
                 Mark::Line(points) | Mark::Dashed(points) | Mark::Dots(points) => points.clone(),
                 Mark::Bars(points) => points.iter().flat_map(|p| [(p.0, p.1 - p.2), (p.0, p.1 + p.2)]).collect(),
                 Mark::Band(points) => points.iter().flat_map(|p| [(p.0, p.1), (p.0, p.2)]).collect(),
+                Mark::Columns(points, wide) => {
+                    points.iter().flat_map(|p| [(p.0 - wide, 0.0), (p.0 + wide, p.1)]).collect()
+                }
             }
         };
         let marks = self.series.iter().flat_map(|series| &series.marks);

@@ -35,15 +35,19 @@ fn panel(diagnosis: &Diagnosis, view: &View) -> Panel {
     };
     let log = spectrum || view.coordinate == Coordinate::SinceReversal;
     let at = |x: f64| if log { x.log10() } else { x };
-    let line = |name: &str, colour, pick: fn(&(f64, f64, f64)) -> f64| {
-        let points: Vec<(f64, f64)> = view.curve.iter().map(|p| (at(p.0), pick(p))).collect();
-        let dots =
-            if view.coordinate == Coordinate::Direction { Mark::Dots(points.clone()) } else { Mark::Line(points) };
-        Series { name: name.into(), colour, marks: vec![dots] }
+    // A direction is one of two: a column up to its mean for each, side by side.
+    let line = |name: &str, colour, aside: f64, pick: fn(&(f64, f64, f64)) -> f64| {
+        let points = view.curve.iter().map(|p| (at(p.0), pick(p)));
+        let marks = if view.coordinate == Coordinate::Direction {
+            vec![Mark::Columns(points.map(|(x, y)| (x + aside, y)).collect(), 0.1)]
+        } else {
+            vec![Mark::Line(points.collect())]
+        };
+        Series { name: name.into(), colour, marks }
     };
-    let mut series = vec![line("as believed", Colour::Orange, |p| p.1)];
+    let mut series = vec![line("as believed", Colour::Orange, if named { -0.06 } else { 0.0 }, |p| p.1)];
     if named {
-        series.push(line("with the causes named", Colour::Blue, |p| p.2));
+        series.push(line("with the causes named", Colour::Blue, 0.06, |p| p.2));
     }
     Panel {
         title: format!(
