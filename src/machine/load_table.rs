@@ -52,7 +52,7 @@ fn signal_name(signal: i32) -> &'static str {
 pub fn save(table: &TiltTable, file: &Path) -> Result<(), Error> {
     table.check().map_err(|fault| {
         let field = fault.field.trim_end_matches('\0');
-        let row = table.load.iter().position(|load| field == "load" && *load == fault.value);
+        let row = table.load.iter().rposition(|load| field == "load" && *load == fault.value);
         let why = match row.filter(|row| *row > 0) {
             Some(row) => format!(
                 "the load at {} mm, {:.4}, does not rise enough over the row before, as known: more than {:.4} is needed; \

@@ -46,13 +46,14 @@ impl Motion {
         Self::with_cutoff(time_s, position, None)
     }
 
-    /// Motion of stretches of rows, all with the cut-off of the longest; NaN in rows outside them. `None` where the longest is
-    /// too short; shorter ones stay NaN.
+    /// Motion of stretches of rows, all with the cut-off that they show together: in one alone the axis may stand, or creep over
+    /// its grid. NaN in rows outside them. `None` where the longest is too short; shorter ones stay NaN.
     #[must_use]
     pub fn of_stretches(time_s: &[f64], position: &[f64], stretches: &[Range<usize>]) -> Option<Motion> {
-        let longest = stretches.iter().max_by_key(|s| s.len()).filter(|s| s.len() >= FEWEST_ROWS)?.clone();
+        let longest = stretches.iter().max_by_key(|s| s.len()).filter(|s| s.len() >= FEWEST_ROWS)?;
         let period_s = (time_s[longest.end - 1] - time_s[longest.start]) / (longest.len() - 1) as f64;
-        let cutoff_hz = noise_crossing_hz(&position[longest], period_s);
+        let pieces: Vec<&[f64]> = stretches.iter().map(|s| &position[s.clone()]).collect();
+        let cutoff_hz = noise_crossing_hz(&pieces, period_s);
         let nothing = || vec![f64::NAN; position.len()];
         let mut motion =
             Motion { position: nothing(), velocity: nothing(), acceleration: nothing(), cutoff_hz, resolution: 0.0 };
@@ -83,7 +84,7 @@ impl Motion {
         let off_grid = |i: usize| ((time_s[i] - start) / period - i as f64).abs();
         let regular = (0..n).all(|i| off_grid(i) < 0.02);
         let grid: Vec<f64> = if regular { position.to_vec() } else { resample(time_s, position, period) };
-        let cutoff_hz = cutoff_hz.unwrap_or_else(|| noise_crossing_hz(&grid, period)).min(0.4 / period);
+        let cutoff_hz = cutoff_hz.unwrap_or_else(|| noise_crossing_hz(&[&grid], period)).min(0.4 / period);
         let [smooth, velocity, acceleration] = differentiate(&grid, period, cutoff_hz);
         let back = |values: Vec<f64>| {
             if regular { values } else { time_s.iter().map(|t| cubic_at(&values, (t - start) / period)).collect() }
@@ -210,12 +211,13 @@ impl Section {
     }
 }
 
-/// Frequency at which the spectrum of motion has sunk to that of the position's white noise.
+/// Frequency at which the spectrum of motion, over all pieces of a recording, has sunk to that of the position's white noise.
 #[must_use]
-pub fn noise_crossing_hz(position: &[f64], period: f64) -> f64 {
+pub fn noise_crossing_hz(pieces: &[&[f64]], period: f64) -> f64 {
     let rate = 1.0 / period;
-    let length = (position.len() / 4).clamp(FEWEST_ROWS, 2048) & !1;
-    let spectrum = position_spectrum(position, length);
+    let longest = pieces.iter().map(|piece| piece.len()).max().unwrap_or(0);
+    let length = (longest / 4).clamp(FEWEST_ROWS, 2048) & !1;
+    let spectrum = position_spectrum(pieces, length);
     let bins = spectrum.len();
     let band = |low: f64, high: f64| {
         let low = ((low * length as f64) as usize).min(bins - 1);
@@ -240,18 +242,18 @@ pub fn noise_crossing_hz(position: &[f64], period: f64) -> f64 {
     frequency.max(lowest) * rate
 }
 
-/// Mean power of the position per bin, from its second difference, in which neither stroke nor drift leaks.
-fn position_spectrum(position: &[f64], length: usize) -> Vec<f64> {
-    let bend: Vec<f64> = position.windows(3).map(|w| w[2] - 2.0 * w[1] + w[0]).collect();
+/// Power of the position per bin, from its second difference, in which neither stroke nor drift leaks.
+fn position_spectrum(pieces: &[&[f64]], length: usize) -> Vec<f64> {
+    let rows: usize = pieces.iter().map(|piece| piece.len()).sum();
     let mut planner = RealFftPlanner::<f64>::new();
     let fft = planner.plan_fft_forward(length);
     let (mut input, mut output) = (fft.make_input_vec(), fft.make_output_vec());
     let mut power = vec![0.0; output.len()];
     // Half overlapping, and no more than some hundred segments however long the recording is.
-    let hop = (length / 2).max(bend.len() / 256).max(1);
-    for start in (0..).step_by(hop).take_while(|start| start + length <= bend.len()) {
-        for (i, (slot, value)) in input.iter_mut().zip(&bend[start..]).enumerate() {
-            *slot = value * 0.5 * (1.0 - (TAU * i as f64 / length as f64).cos());
+    let hop = (length / 2).max(rows / 256).max(1);
+    for segment in pieces.iter().flat_map(|piece| piece.windows(length + 2).step_by(hop)) {
+        for (i, (slot, x)) in input.iter_mut().zip(segment.windows(3)).enumerate() {
+            *slot = (x[2] - 2.0 * x[1] + x[0]) * 0.5 * (1.0 - (TAU * i as f64 / length as f64).cos());
         }
         if fft.process(&mut input, &mut output).is_ok() {
             power.iter_mut().zip(&output).for_each(|(sum, c)| *sum += c.norm_sqr());
@@ -362,5 +364,21 @@ mod tests {
     #[test]
     fn too_few_rows_are_refused() {
         assert!(Motion::estimate(&[0.0; 3], &[0.0; 3]).is_none());
+    }
+
+    #[test]
+    fn stretches_share_one_cut_off_wherever_the_axis_stands_in_the_longest() {
+        // Swinging at 5 Hz with noise; the longest stretch is one in which it stands.
+        let (n, period) = (40_000, 1e-3);
+        let noise = noise(n);
+        let time: Vec<f64> = (0..n).map(|i| i as f64 * period).collect();
+        let swing = |i: usize| 20.0 * (TAU * 5.0 * time[i]).sin() + 1e-4 * noise[i];
+        let moving: Vec<f64> = (0..n).map(swing).collect();
+        let whole = Motion::estimate(&time, &moving).unwrap().cutoff_hz;
+        let stands = 10_000..22_000;
+        let some: Vec<f64> = (0..n).map(|i| if stands.contains(&i) { 1e-4 * noise[i] } else { moving[i] }).collect();
+        let stretches = [0..9_900, stands, 22_100..31_000, 31_200..n];
+        let cut = Motion::of_stretches(&time, &some, &stretches).unwrap().cutoff_hz;
+        assert!(cut > 0.8 * whole && cut < 1.1 * whole, "{cut} Hz, the whole {whole} Hz");
     }
 }

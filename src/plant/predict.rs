@@ -96,8 +96,8 @@ fn needed_torque(
 ) {
     let scale = physics.motor_per_load;
     let (motion, time) = (&observed.motion, &observed.time_s);
-    // Ten times what the position leaves open on the average: it leaves more open at a reversal. Never nothing.
-    let smallest = (10.0 * motion.resolution * scale).max(1e-9 * scale);
+    // Three standard deviations of what the position leaves open: less would turn on noise, more turns late. Never nothing.
+    let smallest = (3.0 * motion.resolution * scale).max(1e-9 * scale);
     let travel = physics.presliding.unwrap_or(0.0).max(smallest);
     let transmitted = physics.two_masses.map(|masses| {
         let simulated = |lag: Option<&mut [f64]>| table_torque(physics, &masses, observed, run.clone(), lag);
