@@ -13,9 +13,9 @@ use crate::recording::ring::{self, NAME_MOST, Wanted};
 use core::ffi::{CStr, c_char, c_void};
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
-const ALIVE: u64 = 0x6769_625f_7265_0001;
+const ALIVE: u32 = 0x6769_7201;
 /// The mark while rows are written: one comparison says that the instance lives, records, and has its memory.
-const RECORDING: u64 = ALIVE + 1;
+const RECORDING: u32 = ALIVE + 1;
 
 /// What to record, under which name. Zero in a field means its default; fields marked "required" have none.
 #[repr(C)]
@@ -72,7 +72,7 @@ pub struct GibRecorderReport {
 /// A recorder. Opaque; its size is `gib_recorder_size()`.
 #[repr(C, align(16))]
 pub struct GibRecorder {
-    alive: u64,
+    alive: u32,
     /// What a step returns: GIB_OK at rest, GIB_BUSY while rows are written, or the error that ended it.
     status: i32,
     last: Fault,

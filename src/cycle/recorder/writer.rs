@@ -55,18 +55,18 @@ impl State {
 /// rows written so far and stores them with release.
 #[inline(always)]
 pub fn step(plan: &Plan, state: &mut State, row: impl FnOnce(usize, u64), head: impl FnOnce(u64)) {
-    if state.wait > 0 {
-        state.wait -= 1;
+    // All is read before the fence: what is behind one, the compiler must read again.
+    let State { rows, place, wait } = *state;
+    if wait > 0 {
+        state.wait = wait - 1;
         return;
     }
-    state.wait = plan.pause;
+    let end = place + plan.row_words;
+    *state = State { rows: rows + 1, place: if end < plan.words { end } else { HEADER_WORDS }, wait: plan.pause };
     // The head that the last row wrote is seen before any word of this one, and this one before its head.
     fence(Ordering::Release);
-    row(state.place, state.rows);
-    state.rows += 1;
-    let end = state.place + plan.row_words;
-    state.place = if end < plan.words { end } else { HEADER_WORDS };
-    head(state.rows);
+    row(place, rows);
+    head(rows + 1);
 }
 
 /// Tells the readers that no row will come any more.
