@@ -44,10 +44,10 @@ gib_speed_variation_config variation_random(uint64_t *state);
 double variation_power(const gib_speed_variation_config *c);
 /*
  * What `runs` random spindles draw at gib's limit, in ascending order; of how many, since those are left out whose limit is
- * not the power, and those that could do less than 2 %: what that does against chatter is nothing, and the drive's own
- * overshoot at a corner is as large.
+ * not the power, and those that could do less than 0.6 %: what that does against chatter is nothing, and the drive's own
+ * overshoot at a corner is larger.
  */
-#define LEAST_AMPLITUDE 0.02
+#define LEAST_AMPLITUDE 0.006
 int drawn_by_random(uint64_t seed, double *drawn, int runs);
 
 #endif

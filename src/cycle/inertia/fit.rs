@@ -177,16 +177,24 @@ fn without_lone(blocks: &[Block], kept: &mut [Block; BLOCKS]) -> usize {
 }
 
 /// Variance of the noise of the acceleration, from its second difference over neighbouring blocks, whose variance is
-/// six times as large; by the median, so that the corners of a ramp do not count.
+/// six times as large; by the median, and where ramps are only a few blocks long without their corners.
 fn acceleration_noise(blocks: &[Block]) -> f64 {
     const STD_PER_MAD: f64 = 1.482_602_218_505_602;
+    let corner = 0.3 * quantile(blocks, 0.98, |b| b.acceleration.abs());
+    let triples = || {
+        blocks.windows(3).filter_map(|triple| match triple {
+            [a, b, c] => Some([a.acceleration, b.acceleration, c.acceleration]),
+            _ => None,
+        })
+    };
+    let smooth = |[a, b, c]: &[f64; 3]| a.max(*b).max(*c) - a.min(*b).min(*c) <= corner;
+    // Where nothing but noise is seen, hardly any three are close to each other: then all count.
+    let all = 4 * triples().filter(smooth).count() < triples().count();
     let mut curvature = [0.0; BLOCKS];
     let mut n = 0;
-    for (triple, place) in blocks.windows(3).zip(curvature.iter_mut()) {
-        if let [a, b, c] = triple {
-            *place = (a.acceleration - 2.0 * b.acceleration + c.acceleration).abs();
-            n += 1;
-        }
+    for ([a, b, c], place) in triples().filter(|triple| all || smooth(triple)).zip(curvature.iter_mut()) {
+        *place = (a - 2.0 * b + c).abs();
+        n += 1;
     }
     let Some(seen) = curvature.get_mut(..n).filter(|seen| !seen.is_empty()) else { return 0.0 };
     let middle = *seen.select_nth_unstable_by(n / 2, f64::total_cmp).1;
@@ -261,8 +269,14 @@ fn student(freedom: f64) -> f64 {
     Z + (Z.powi(3) + Z) / (4.0 * f) + (5.0 * Z.powi(5) + 16.0 * Z.powi(3) + 3.0 * Z) / (96.0 * f * f)
 }
 
+/// By how much wider an interval must be since its covariance rests on few stretches of time: the 97.5 % quantile for
+/// Bartlett's window of `share` of the blocks over the normal one (Kiefer and Vogelsang 2005).
+fn few_stretches(share: f64) -> f64 {
+    (1.96 + 2.9694 * share + 0.416 * share.powi(2) - 0.5324 * share.powi(3)) / 1.96
+}
+
 fn fill(balance: &mut Balance, found: &Regression) {
-    let t = student(found.used as f64 - 4.0);
+    let t = student(found.used as f64 - 4.0) * few_stretches(found.lag_share);
     let value = |i: usize| Value { value: found.terms[i], uncertainty: t * found.covariance[(i, i)].max(0.0).sqrt() };
     balance.inertia = value(0);
     balance.viscous = value(1);
@@ -281,8 +295,8 @@ fn ramp(rows: &Rows, balance: &Balance, length: u32, question: &Question) -> Ram
     let span = 0.9 * top;
     let density = balance.scatter.powi(2) * f64::from(length) * question.sample_s / PARABOLA;
     let inertia = balance.inertia.value.abs().max(1e-3 * balance.inertia.uncertainty);
-    // A margin of a quarter: the noise is itself only estimated.
-    let wanted = question.target * inertia / (1.25 * student(100.0));
+    // A margin of a half: the noise is itself only estimated, and ripple hangs together longer than a block.
+    let wanted = question.target * inertia / (1.5 * student(100.0));
     let needed = density / (2.0 * span * wanted * wanted);
     // No slower than a quarter of what was seen, no faster than the torque seen allows.
     let seen = quantile(rows.blocks, 0.98, |b| b.acceleration.abs());

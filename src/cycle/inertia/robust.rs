@@ -60,6 +60,8 @@ pub struct Regression {
     pub used: usize,
     /// Blocks dropped as outliers.
     pub dropped: usize,
+    /// Lags over blocks of that covariance.
+    pub lag_share: f64,
     /// Share of the acceleration's variance, free of the other terms, that is noise.
     pub noise_share: f64,
 }
@@ -182,7 +184,8 @@ impl Rows<'_> {
         let covariance = if sandwich[(0, 0)] > plain[(0, 0)] { sandwich } else { plain };
         let free = 1.0 / (inverse[(0, 0)] * used as f64);
         let noise_share = self.noise / (self.noise + free);
-        Some(Regression { terms, covariance, scatter, used, dropped: n - used, noise_share })
+        let lag_share = (lags + 1) as f64 / used as f64;
+        Some(Regression { terms, covariance, scatter, used, dropped: n - used, lag_share, noise_share })
     }
 }
 

@@ -316,7 +316,7 @@ impl SpeedVariation {
         self.output.period_limit_s = plan.shortest(&motor, mean, amplitude);
         self.output.message = if granted < amplitude * (1.0 - 1e-9) { code(limit) } else { GIB_OK };
         // The last trifle is the speed loop's, which follows the command with a little overshoot.
-        const FOLLOWED: f64 = 0.998;
+        const FOLLOWED: f64 = 0.9955;
         self.motor = Motor { power: FOLLOWED * motor.power, torque: FOLLOWED * motor.torque, ..motor };
         if plan.published {
             // The print knows no limit at the top of the swing, and is shown without one.
@@ -333,7 +333,7 @@ impl SpeedVariation {
         }
         self.mean = mean;
         self.corners = [mean * (1.0 - granted), mean * (1.0 + granted)];
-        self.rate = 4.0 * granted * mean * plan.cycle_s / period;
+        self.rate = self.corner_rate().min(4.0 * granted * mean * plan.cycle_s / period);
         self.free = [0.0, self.brake_help].map(|help| self.motor.fastest(self.rate * self.nm_per - help));
         self.turn_by(TAU * plan.cycle_s / period);
         self.swing_goal = granted * mean;
@@ -341,6 +341,15 @@ impl SpeedVariation {
         self.swing = self.swing.min(self.swing_goal);
         self.swing_rate = self.swing_goal * plan.cycle_s / period;
         Ok(())
+    }
+
+    /// Largest change in a cycle whose overshoot behind the lower corner the motor's power still allows. Of a swing of more
+    /// than 2 % it bounds nothing: the power is used up at the top.
+    fn corner_rate(&self) -> f64 {
+        const OVERSHOOT: f64 = 0.042;
+        let (Motor { power, used, viscous, .. }, [low, _]) = (self.motor, self.corners);
+        let left = power / low - used - viscous * low;
+        left.max(0.0) * self.per_nm / (1.0 + OVERSHOOT)
     }
 
     /// One cycle back toward the mean.

@@ -50,10 +50,12 @@ impl SpeedVariation {
             Wave::Triangle => (self.slope_left(change), change),
             Wave::Sine => {
                 let missing = self.swing_goal - self.swing;
-                match missing / self.swing_rate {
-                    left if left >= 1.0 => (left as i32, self.swing_rate),
-                    _ if missing == 0.0 => (i32::MAX, 0.0),
-                    _ => (0, 0.0),
+                if missing == 0.0 {
+                    (i32::MAX, 0.0)
+                } else if missing >= self.swing_rate {
+                    ((missing / self.swing_rate) as i32, self.swing_rate)
+                } else {
+                    (0, 0.0)
                 }
             }
         };
