@@ -151,17 +151,49 @@ static int not_fooled(void)
     c.stop_mm[1] = 6.05;
     g = homing_config(&c);
     bad += show("gantry, 0.05 mm out of square", &c, &g, GIB_DONE);
-    c.beam_nm_mm = 2.0;
     c.stop_mm[1] = 6.5;
     bad += show("gantry, 0.5 mm out of square", &c, &g, GIB_ERR_HOMING_SQUARE);
+    c.beam_nm_mm = 60.0; /* holds the other side before its stop */
+    bad += show("the same, the beam three times as stiff", &c, &g, GIB_ERR_HOMING_SQUARE);
     printf("\n");
     return bad;
 }
 
+/* One homing as a recording, for `gib homing`. */
+static int record(const char *path)
+{
+    static homing_plant p;
+    homing_plant_config c = homing_plant_default();
+    gib_homing_config g = homing_config(&c);
+    gib_homing *gib = gib_homing_new();
+    FILE *file = fopen(path, "w");
+    int32_t status = gib_homing_start(gib, &g);
+    if (!file || status != GIB_OK) {
+        fprintf(stderr, "homing_demo: %s: not written\n", path);
+        gib_homing_free(gib);
+        return 1;
+    }
+    homing_plant_init(&p, &c);
+    fprintf(file, "time_s,x.position_mm,x.torque_nm\n");
+    do {
+        const gib_homing_input *in = homing_plant_cycle(&p);
+        status = gib_homing_step(gib, in, &p.out);
+        fprintf(file, "%.6f,%.7f,%.5f\n", p.time_s, in->position_mm[0], in->torque[0]);
+    } while (status == GIB_BUSY);
+    gib_homing_report report;
+    gib_homing_result(gib, &report);
+    gib_homing_free(gib);
+    printf("Recording of one homing: %s; the control found the contact at %.4f mm +- %.2f um.\n", path,
+           report.side[0].contact_mm, report.side[0].uncertainty_um);
+    return fclose(file) != 0 || status != GIB_DONE;
+}
+
+/* homing_demo [RUNS [RECORDING.csv]] */
 int main(int argc, char **argv)
 {
     int runs = argc > 1 ? atoi(argv[1]) : 30;
     int bad = repeatability(runs) + not_fooled();
+    bad += argc > 2 ? record(argv[2]) : 0;
     printf(bad ? "%d results are not as they must be\n" : "all as it must be\n", bad);
     return bad != 0;
 }

@@ -206,6 +206,12 @@ static uint32_t flags(homing_fault fault)
     }
 }
 
+/* N.m of one unit of the drive's torque, with its sign. */
+static double unit_nm(const homing_plant *p)
+{
+    return p->c.torque_unit_nm != 0.0 ? p->c.torque_unit_nm : 1.0;
+}
+
 static void serve_requests(homing_plant *p)
 {
     if (p->out.request_id == p->done_id || p->fault == FAULT_NO_ACKNOWLEDGEMENT) {
@@ -218,7 +224,7 @@ static void serve_requests(homing_plant *p)
     if (p->out.requests & GIB_HOMING_REQUEST_TORQUE_LIMIT) {
         p->in.torque_limit = p->out.torque_limit;
         if (p->fault != FAULT_LIMIT_IGNORED) {
-            p->limit_nm = p->out.torque_limit;
+            p->limit_nm = p->out.torque_limit * fabs(unit_nm(p));
         }
     }
     if (p->out.requests & GIB_HOMING_REQUEST_SET_POSITION) {
@@ -237,7 +243,7 @@ const gib_homing_input *homing_plant_cycle(homing_plant *p)
 {
     const homing_plant_config *c = &p->c;
     if (p->first_cycle) {
-        p->in.torque_limit = p->limit_nm;
+        p->in.torque_limit = p->limit_nm / fabs(unit_nm(p));
     }
     serve_requests(p);
     if (p->fault == FAULT_CHIPS && c->chips_mm == 0.0 && p->side[0].y < c->stop_mm[0] - 0.35) {
@@ -250,7 +256,7 @@ const gib_homing_input *homing_plant_cycle(homing_plant *p)
         double x = encoder(p, s);
         double told = p->fault == FAULT_ENCODER_NAN ? NAN : p->fault == FAULT_ENCODER_INF ? INFINITY : x;
         p->in.position_mm[i] = c->sense * told;
-        p->in.torque[i] = c->sense * torque_reading(p, s);
+        p->in.torque[i] = c->sense * torque_reading(p, s) / unit_nm(p);
         int follows = p->out.owns_motion && p->fault != FAULT_NOT_FOLLOWED;
         double target = follows ? c->sense * p->out.target_position_mm[i] : s->last_target;
         if (p->first_cycle || (p->owned && !p->out.owns_motion)) {

@@ -60,8 +60,8 @@ static void home_depends_on_neither_limit_nor_stiffness(void **state)
     assert_true(fabs(threshold[1] - threshold[0]) > 20.0);
 }
 
-/* A rotary axis is the same axis in degrees; torque in per mille of rated, and inverted, is the same torque. */
-static void units_and_polarity(void **state)
+/* A rotary axis is the same axis in degrees, and the lag may be dropped without the kernel. */
+static void degrees_and_instant_lag_reduction(void **state)
 {
     (void)state;
     homing_plant_config c = homing_plant_default();
@@ -73,22 +73,83 @@ static void units_and_polarity(void **state)
     assert_int_equal(o.events, 6); /* none asked, none acknowledged */
 }
 
-/* A gantry is squared to its stops, and one that is too far out is refused. */
-static void gantry(void **state)
+/* Torque in per mille of rated, and with its sign turned, is the same torque; unless gib is not told. */
+static void torque_unit_and_polarity(void **state)
+{
+    (void)state;
+    homing_outcome plain, other;
+    for (int sense = -1; sense <= 1; sense += 2) {
+        for (int k = 0; k < 4; k++) {
+            homing_plant_config c = homing_plant_default();
+            const int permille = k & 1, inverted = k >> 1;
+            c.sense = sense;
+            c.torque_unit_nm = (permille ? 0.008 : 1.0) * (inverted ? -1.0 : 1.0); /* rated 8 N.m */
+            gib_homing_config g = homing_config(&c);
+            g.torque_unit = permille ? GIB_TORQUE_PERMILLE : GIB_TORQUE_NM;
+            g.rated_torque_nm = permille ? 8.0 : 0.0;
+            g.torque_inverted = inverted;
+            other = homing_run(&c, &g);
+            assert_int_equal(other.status, GIB_DONE);
+            plain = k == 0 ? other : plain;
+            const gib_homing_side *a = &plain.report.side[0], *b = &other.report.side[0];
+            assert_true(fabs(a->contact_mm - b->contact_mm) < 1e-6);
+            assert_true(fabs(a->stiffness_nm_mm / b->stiffness_nm_mm - 1.0) < 1e-6);
+            assert_true(fabs(a->sliding_nm - b->sliding_nm) < 1e-6 && a->sliding_nm > 1.0);
+            assert_true(fabs(other.report.old_torque_limit * fabs(c.torque_unit_nm) - c.torque_limit_nm) < 1e-9);
+            assert_true(fabs(other.limit_nm - c.torque_limit_nm) < 1e-9);
+            g.torque_inverted = !inverted;
+            other = homing_run(&c, &g);
+            assert_int_equal(other.status, GIB_ERR_HOMING_TORQUE_SIGN);
+            assert_true(other.most_travel_mm <= g.distance_max_mm && other.most_torque_nm <= g.torque_limit_nm + 1e-9);
+        }
+    }
+}
+
+/* Which home is: where the line starts unless the plain threshold is asked for; both are reported. */
+static void method(void **state)
 {
     (void)state;
     homing_plant_config c = homing_plant_default();
-    c.motors = 2;
-    c.beam_nm_mm = 20.0;
-    c.stop_mm[1] = 6.05;
     gib_homing_config g = homing_config(&c);
-    homing_outcome o = homing_run(&c, &g);
-    assert_int_equal(o.status, GIB_DONE);
-    assert_true(fabs(o.report.skew_mm + 0.05) < 0.02);
-    c.beam_nm_mm = 2.0; /* stiffer, and the beam alone would hold the other side */
-    c.stop_mm[1] = 6.5;
-    o = homing_run(&c, &g);
-    assert_int_equal(o.status, GIB_ERR_HOMING_SQUARE);
+    homing_outcome line = homing_run(&c, &g);
+    g.method = GIB_HOMING_THRESHOLD;
+    homing_outcome threshold = homing_run(&c, &g);
+    assert_true(line.status == GIB_DONE && threshold.status == GIB_DONE);
+    const gib_homing_side *a = &line.report.side[0], *b = &threshold.report.side[0];
+    assert_true(line.report.method == GIB_HOMING_LINE && threshold.report.method == GIB_HOMING_THRESHOLD);
+    assert_true(fabs(a->contact_mm - b->contact_mm) < 1e-9 && fabs(a->threshold_mm - b->threshold_mm) < 1e-9);
+    /* Machine coordinates differ by just what lies between the two. */
+    assert_true(fabs(a->shift_mm - b->shift_mm - (a->threshold_mm - a->contact_mm)) < 1e-9);
+    assert_true(a->threshold_mm - a->contact_mm > 0.01);
+}
+
+/*
+ * A gantry is squared to its stops, whichever side is first, or it is refused: one that is too far out, and one whose
+ * crossbeam alone holds the other side before its stop.
+ */
+static void gantry(void **state)
+{
+    (void)state;
+    const double apart[] = {0.0, 0.02, 0.05, 0.12, 0.3, 0.5}, beam[] = {0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 60.0};
+    for (size_t i = 0; i < sizeof apart / sizeof *apart; i++) {
+        for (size_t k = 0; k < sizeof beam / sizeof *beam; k++) {
+            homing_plant_config c = homing_plant_default();
+            const double out = i % 2 ? apart[i] : -apart[i];
+            c.motors = 2;
+            c.beam_nm_mm = beam[k];
+            c.stop_mm[1] = c.stop_mm[0] + out;
+            gib_homing_config g = homing_config(&c);
+            homing_outcome o = homing_run(&c, &g);
+            int squared = o.status == GIB_DONE && fabs(o.report.skew_mm + out) < 0.02;
+            int refused = o.status == GIB_ERR_HOMING_SQUARE;
+            int must_home = apart[i] <= 0.12 && beam[k] <= 10.0, must_refuse = apart[i] > 0.2;
+            if (!(squared || refused) || (must_home && !squared) || (must_refuse && !refused)) {
+                fail_msg("%.2f mm apart, beam %.0f Nm/mm: status %d, skew %.3f", out, beam[k], (int)o.status,
+                         o.report.skew_mm);
+            }
+            assert_true(o.most_torque_nm <= g.torque_limit_nm + 1e-9);
+        }
+    }
 }
 
 static void refuses_what_it_cannot_do(void **state)
@@ -129,7 +190,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(homes_either_way),
         cmocka_unit_test(home_depends_on_neither_limit_nor_stiffness),
-        cmocka_unit_test(units_and_polarity),
+        cmocka_unit_test(degrees_and_instant_lag_reduction),
+        cmocka_unit_test(torque_unit_and_polarity),
+        cmocka_unit_test(method),
         cmocka_unit_test(gantry),
         cmocka_unit_test(refuses_what_it_cannot_do),
     };

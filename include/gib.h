@@ -2176,7 +2176,8 @@ typedef struct gib_homing_config {
      */
     double approach_speed_mm_s;
     /**
-     * Speed of the measured touches, 0.01 mm/s to the approach speed (default: the approach speed, at most 1).
+     * Speed of the measured touches, 0.01 mm/s to the approach speed (default: the approach speed, at most 1; down to a
+     * quarter of that where the torque would rise to the limit within 25 ms).
      */
     double touch_speed_mm_s;
     /**

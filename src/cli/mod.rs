@@ -4,6 +4,7 @@
 //! error as one sentence.
 
 mod diagnose;
+mod homing;
 mod inertia;
 mod inspect;
 mod lost_motion;
@@ -21,6 +22,7 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use gib::recording::{Recording, Signal};
 
 /// What a command has to say.
 pub struct Answer {
@@ -60,6 +62,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Diagnose(diagnose::Diagnose),
+    Homing(homing::HomingCommand),
     Inertia(inertia::InertiaCommand),
     Inspect(inspect::Inspect),
     Predict(predict::Predict),
@@ -75,6 +78,7 @@ enum Command {
 pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Diagnose(command) => command.run(),
+        Command::Homing(command) => command.run(),
         Command::Inertia(command) => command.run(),
         Command::Inspect(command) => command.run(),
         Command::Predict(command) => command.run(),
@@ -94,6 +98,20 @@ pub fn run() -> ExitCode {
         Err(why) => {
             eprintln!("gib: {why}");
             ExitCode::from(2)
+        }
+    }
+}
+
+/// The axis to look at: the one given, else the only one that has a position.
+fn axis(recording: &Recording, given: Option<&str>) -> std::result::Result<String, String> {
+    let axes: Vec<&str> =
+        recording.channels().into_iter().filter(|c| recording.get(c, Signal::Position).is_some()).collect();
+    match (given, axes.as_slice()) {
+        (Some(axis), _) => Ok(axis.to_owned()),
+        (None, [one]) => Ok((*one).to_owned()),
+        (None, []) => Err(format!("{}: has no column <axis>.position_<unit>", recording.file)),
+        (None, several) => {
+            Err(format!("{}: has the axes {}; choose one with --axis", recording.file, several.join(", ")))
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Pictures for people: plots as SVG.
 
+pub mod homing;
 pub mod inertia;
 pub mod lost_motion;
 pub mod plot;

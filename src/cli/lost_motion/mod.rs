@@ -64,7 +64,7 @@ impl LostMotionCommand {
     /// Measures and tells.
     pub fn run(&self) -> Result {
         let recording = Recording::open(&self.recording)?;
-        let axis = self.axis(&recording)?;
+        let axis = super::axis(&recording, self.axis.as_deref())?;
         let model = self.model(&axis)?;
         let refused = |why| format!("{}: axis {axis}: {why}", recording.file);
         let both = recording.get(&axis, Signal::TablePosition).is_some();
@@ -88,19 +88,6 @@ impl LostMotionCommand {
         }
         let text = if self.json { serde_json::to_string_pretty(&json)? + "\n" } else { text };
         Ok(Answer { text, good })
-    }
-
-    fn axis(&self, recording: &Recording) -> std::result::Result<String, String> {
-        let axes: Vec<&str> =
-            recording.channels().into_iter().filter(|c| recording.get(c, Signal::Position).is_some()).collect();
-        match (&self.axis, axes.as_slice()) {
-            (Some(axis), _) => Ok(axis.clone()),
-            (None, [one]) => Ok((*one).to_owned()),
-            (None, []) => Err(format!("{}: has no column <axis>.position_<unit>", recording.file)),
-            (None, several) => {
-                Err(format!("{}: has the axes {}; choose one with --axis", recording.file, several.join(", ")))
-            }
-        }
     }
 
     fn model(&self, axis: &str) -> std::result::Result<Option<Axis>, String> {

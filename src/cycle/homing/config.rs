@@ -47,7 +47,8 @@ pub struct HomingConfig {
     pub cycle_s: f64,
     /// Speed on the way to the stop, 0.01 to 100 mm/s (default 1).
     pub approach_speed_mm_s: f64,
-    /// Speed of the measured touches, 0.01 mm/s to the approach speed (default: the approach speed, at most 1).
+    /// Speed of the measured touches, 0.01 mm/s to the approach speed (default: the approach speed, at most 1; down to a
+    /// quarter of that where the torque would rise to the limit within 25 ms).
     pub touch_speed_mm_s: f64,
     /// Largest commanded acceleration, 0.1 to 10000 mm/s² (default 50).
     pub acceleration_mm_s2: f64,

@@ -21,8 +21,9 @@ use super::trace::{BLOCKS, Trace};
 const SLICE: u32 = 8;
 /// Fewest blocks in a level or a line.
 const FEWEST: f64 = 6.0;
-/// Part of the line that is used: from the share of the rise where impact is over to the one where limiting is near.
-const LINE_FROM: f64 = 0.13;
+/// Part of the line that is used: from the share of the rise where impact is over to the one where limiting is near. On
+/// random axes the contact found with 0.13 lies 0.15 µm off in the mean, with 0.2 nothing.
+const LINE_FROM: f64 = 0.2;
 const LINE_TO: f64 = 0.95;
 /// The level ends this share of the line's length before the corner.
 const LEVEL_GAP: f64 = 0.1;
@@ -121,6 +122,9 @@ pub struct Fit {
     early: Sums,
     level: Sums,
     line: Sums,
+    /// From block to block of the line, and its last block.
+    steps: Sums,
+    before: Option<(f64, f64)>,
     least: f64,
     split: Contact,
     found: Option<Contact>,
@@ -141,6 +145,8 @@ impl Default for Fit {
             early: Sums::default(),
             level: Sums::default(),
             line: Sums::default(),
+            steps: Sums::default(),
+            before: None,
             least: f64::INFINITY,
             split: Contact::default(),
             found: None,
@@ -245,6 +251,10 @@ impl Fit {
             self.level.add(1.0, block);
         } else if along >= LINE_FROM * length && along <= LINE_TO * length {
             self.line.add(1.0, block);
+            if let Some((x, t)) = self.before {
+                self.steps.add(1.0, (block.0 - x, block.1 - t));
+            }
+            self.before = Some(block);
         }
     }
 
@@ -270,6 +280,16 @@ impl Fit {
         };
     }
 
+    /// By how much the line's variance exceeds that of independent blocks: an axis that swings or sticks and slips on the
+    /// stop scatters about its line, but not from block to block (Durbin and Watson's ratio, 2·(1 − ρ)).
+    fn hanging_together(&self, slope: f64, about_line: f64) -> f64 {
+        const MOST: f64 = 0.7;
+        let (s, scatter) = (&self.steps, about_line.max(f64::MIN_POSITIVE));
+        let ratio = (s.tt - 2.0 * slope * s.xt + slope * slope * s.xx).max(0.0) / scatter;
+        let rho = (1.0 - 0.5 * ratio).clamp(0.0, MOST);
+        (1.0 + rho) / (1.0 - rho)
+    }
+
     /// Contact point and its variance from the refined sums; `None` for a curve that is not a level and a line.
     fn solve(&self) -> Option<Contact> {
         /// Standard errors by which the slope must be above zero.
@@ -291,6 +311,7 @@ impl Fit {
         let way = mean - (line.t / line.n - torque) / slope;
         let of_level = level.scatter() / (level.n - 1.0) / level.n;
         let of_line = about_line / (line.n - 2.0) * (1.0 / line.n + (mean - way) * (mean - way) / sxx);
+        let of_line = of_line * self.hanging_together(slope, about_line);
         let contact = Contact {
             way,
             variance: (of_level + of_line) / (slope * slope),

@@ -17,6 +17,7 @@ use super::verdict::{HomingReport, HomingSide, Touches};
 use crate::cycle::backlash::io::GIB_INPUT_ABORT;
 use crate::error::*;
 
+mod gantry;
 mod sequence;
 
 /// Where the machine is. Each comment says what ends the state.
@@ -75,6 +76,8 @@ pub struct Homing {
     fitting: usize,
     fit: Fit,
     touches: [Touches; 2],
+    /// Gantry: how far apart its sides stood where both pressed last, mm.
+    pressed_apart: f64,
     /// On the way out: the commands have come to rest.
     stopped: bool,
     /// Torque limit in force at the start.
@@ -100,6 +103,7 @@ impl Default for Homing {
             fitting: 0,
             fit: Fit::default(),
             touches: [Touches::default(); 2],
+            pressed_apart: 0.0,
             stopped: false,
             old_limit: 0.0,
             changed: false,

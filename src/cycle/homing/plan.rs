@@ -23,8 +23,10 @@ pub struct Plan {
     pub acknowledged: u32,
     /// Speeds, mm per cycle.
     pub approach: f64,
-    /// Speed of measured touches, mm per cycle.
+    /// Speed of measured touches, mm per cycle, and whether it was left to gib.
     pub touch: f64,
+    /// See `touch`.
+    pub may_slow: bool,
     /// Speed of the zero-offset move, mm per cycle.
     pub offset_speed: f64,
     /// Largest change of speed, mm per cycle².
@@ -92,6 +94,7 @@ impl Plan {
         acknowledged: 0,
         approach: 1e-3,
         touch: 1e-3,
+        may_slow: false,
         offset_speed: 1e-3,
         acceleration: 1e-5,
         limit: 0.0,
@@ -165,6 +168,7 @@ impl Plan {
             acknowledged: !(in_range("unacknowledged\0", f64::from(c.unacknowledged), 0.0, 7.0)? as u32),
             approach: approach * cycle,
             touch: touch * cycle,
+            may_slow: c.touch_speed_mm_s == 0.0,
             offset_speed: offset_speed * cycle,
             acceleration: acceleration * cycle * cycle,
             limit: limit_nm / torque_nm,
@@ -196,6 +200,16 @@ impl Plan {
     #[must_use]
     pub fn block(&self, speed: f64) -> u32 {
         (self.window() / (TRACE_BLOCKS * speed)).ceil() as u32
+    }
+
+    /// Makes the measured touches slow enough for a line of `press` mm, down to a quarter of their speed: while the impact
+    /// still swings, nothing can be read off the line.
+    pub fn slow_down(&mut self, press: f64) {
+        const LINE_S: f64 = 0.025;
+        if self.may_slow && press > 0.0 {
+            let slow = press / (LINE_S * self.cycles_per_s);
+            self.touch = slow.max(0.25 * self.touch).min(self.touch);
+        }
     }
 
     /// Speed of the way back, mm per cycle: as gentle as a touch, and half of it is gone at a steady speed.

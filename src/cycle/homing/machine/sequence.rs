@@ -208,13 +208,17 @@ impl Homing {
         let back = self.touch < plan.touches;
         for (side, touches) in self.sides.iter().zip(&self.touches).take(plan.motors) {
             if let (true, Some(fault)) = (back, side.held_back(&plan, touches.level())) {
-                return self.leave(fault);
+                return self.leave(self.or_racked(fault));
             }
         }
         if self.suspect != Fault::NONE {
-            return self.leave(self.suspect);
+            return self.leave(self.or_racked(self.suspect));
         }
         if back {
+            if self.touch == 0 {
+                let press = self.touches.iter().take(plan.motors).map(Touches::first_press);
+                self.plan.slow_down(press.fold(f64::INFINITY, f64::min));
+            }
             self.touch += 1;
             self.start_touch();
         } else {
@@ -266,30 +270,11 @@ impl Homing {
         self.leave(fault);
     }
 
-    /// Way to the stop of motor 1 minus that of motor 2.
-    pub(super) fn skew(&self) -> f64 {
-        if self.plan.motors == 2 { self.touches[0].contact() - self.touches[1].contact() } else { 0.0 }
-    }
-
-    /// Gantry: how far apart the two sides have gone since the start.
-    #[inline(always)]
-    pub(super) fn check_square(&mut self) {
-        let apart = self.sides[0].travel(&self.plan) - self.sides[1].travel(&self.plan);
-        if apart.abs() > self.plan.square {
-            self.askew(apart);
-        }
-    }
-
-    #[cold]
-    fn askew(&mut self, apart: f64) {
-        let (code, field, high) = (GIB_ERR_HOMING_SQUARE, "square_tolerance_mm\0", self.plan.square);
-        self.leave(Fault { code, field, value: apart, low: -high, high });
-    }
-
     /// Every motor has pressed for the detection time.
     #[cold]
     pub(super) fn pressed(&mut self) {
         let plan = self.plan;
+        self.keep_apart();
         if self.touch == 0 {
             let way = self.sides.iter().take(plan.motors).map(|side| side.travel(&plan)).fold(f64::INFINITY, f64::min);
             let early = |code, low| Fault { code, field: "distance_min_mm\0", value: way, low, high: plan.distance[1] };
@@ -340,9 +325,8 @@ impl Homing {
                 return self.leave(fault);
             }
         }
-        let skew = self.skew();
-        if skew.abs() > plan.square {
-            return self.askew(skew);
+        if let Err(fault) = self.squared() {
+            return self.leave(fault);
         }
         let mut bound = 0f64;
         for i in 0..plan.motors.min(2) {

@@ -15,9 +15,9 @@ impl Side {
         // Counted down first: that takes the fewest instructions. Written so that a NaN is not usual.
         self.cruise -= 1;
         let usual = self.cruise >= 0
-            && flags == 0
             && (lag - self.usual_lag).abs() <= self.lag_band
             && position != self.position
+            && flags == 0
             && filtered > plan.bound_below
             && !(filtered >= self.trip);
         if usual {
@@ -33,6 +33,9 @@ impl Side {
     pub fn quick_slow(&mut self, plan: &Plan, position: f64, torque: f64, flags: u32) -> bool {
         self.cruise += 1;
         let filtered = (1.0 - GAIN) * self.filtered + plan.torque_share * torque;
+        if self.cruise > 0 {
+            return self.quick_lag(plan, position, torque, filtered, flags);
+        }
         let goes_on = if self.held {
             (position - self.anchor).abs() <= plan.standing_way
         } else {
@@ -54,6 +57,33 @@ impl Side {
             self.profile.step();
         }
         true
+    }
+
+    /// The same where the command goes on at its speed and only the lag has left its band: it counts as usual from now on,
+    /// where it is within all bounds.
+    #[inline(always)]
+    fn quick_lag(&mut self, plan: &Plan, position: f64, torque: f64, filtered: f64, flags: u32) -> bool {
+        let usual = flags == 0
+            && self.safe(plan, position, torque)
+            && filtered > plan.bound_below
+            && filtered < self.trip
+            && position != self.position;
+        if usual {
+            self.cruise -= 1;
+            self.take_in(position, torque, filtered);
+            self.centre(plan, self.profile.position - position);
+            self.profile.cruise_on();
+        }
+        usual
+    }
+
+    /// Makes `lag`, that of this cycle, the usual one. Between two lags of the band about it the position changes by no more
+    /// than a jump, nor goes beyond the end.
+    #[inline(always)]
+    fn centre(&mut self, plan: &Plan, lag: f64) {
+        self.usual_lag = lag;
+        let to_limit = lower(plan.lag_limit - lag.abs(), plan.distance[1] - self.travel(plan));
+        self.lag_band = lower(0.5 * (plan.jump - self.profile.speed_max()), to_limit);
     }
 
     #[inline(always)]
@@ -97,10 +127,8 @@ impl Side {
             let to_end = plan.distance[1] - plan.sense * (p.position - self.start);
             let away = p.speed * plan.sense < 0.0;
             let free = lower(way - p.braking() - 2.0 * speed, if away { way } else { to_end - plan.lag_limit });
-            // Between two lags of the band the position changes by no more than a jump, nor goes beyond the end.
-            self.usual_lag = p.position - p.speed - self.position;
-            let to_limit = lower(plan.lag_limit - self.usual_lag.abs(), plan.distance[1] - self.travel(plan));
-            self.lag_band = lower(0.5 * (plan.jump - speed), to_limit);
+            let lag = p.position - p.speed - self.position;
+            self.centre(plan, lag);
             self.granted = ((free / speed) as u32).min(left).min(i32::MAX as u32);
             self.cruise = self.granted as i32;
             return;
