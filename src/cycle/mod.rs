@@ -8,6 +8,7 @@ pub mod backlash;
 pub mod calibration;
 pub mod homing;
 pub mod inertia;
+pub mod lanes;
 pub mod learning;
 pub mod level;
 pub mod profile;

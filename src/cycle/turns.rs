@@ -6,12 +6,18 @@
 /// Adding and taking away this rounds a number below 2^51 to a whole one; `f64::round` would be a call.
 const ROUNDING: f64 = 1.5 * (1u64 << 52) as f64;
 
+/// Turns less whole turns: −0.5 to 0.5.
+#[inline(always)]
+#[must_use]
+pub fn folded(turns: f64) -> f64 {
+    turns - ((turns + ROUNDING) - ROUNDING)
+}
+
 /// Turns less whole turns: −0.5 to 0.5, without digits below 1e-16, which could become subnormal in products.
 #[inline(always)]
 #[must_use]
 pub fn fold(turns: f64) -> f64 {
-    let whole = (turns + ROUNDING) - ROUNDING;
-    ((turns - whole) + 1.0) - 1.0
+    (folded(turns) + 1.0) - 1.0
 }
 
 /// cos and sin of a number of turns, −0.5 to 0.5.

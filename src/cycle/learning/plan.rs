@@ -14,10 +14,10 @@ pub struct Plan {
     pub points: usize,
     /// See `points`.
     pub scale: f64,
-    /// Harmonics, and vectors of four that they take.
+    /// Harmonics, and pairs of them.
     pub harmonics: usize,
     /// See `harmonics`.
-    pub vectors: usize,
+    pub pairs: usize,
     /// Turns to measure over, and to settle for.
     pub measure: f64,
     /// See `measure`.
@@ -62,7 +62,7 @@ impl Plan {
         points: 16,
         scale: 16.0,
         harmonics: 1,
-        vectors: 1,
+        pairs: 1,
         measure: 1.0,
         settle: 1.0,
         updates: 0,
@@ -108,7 +108,7 @@ impl Plan {
             points: points as usize,
             scale: points,
             harmonics: harmonics as usize,
-            vectors: (harmonics as usize).div_ceil(4),
+            pairs: (harmonics as usize).div_ceil(2),
             measure: whole("revolutions\0", c.revolutions, 2.0, 1.0, 64.0)?,
             settle: whole("settle_revolutions\0", c.settle_revolutions, 2.0, 1.0, 64.0)?,
             updates: whole("updates\0", c.updates, 100.0, 1.0, 1e4)? as u32,

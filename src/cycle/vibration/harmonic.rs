@@ -1,4 +1,4 @@
-//! Harmonics of one signal over the spindle's angle, tracked cycle by cycle.
+//! Harmonics of two signals over the spindle's angle, tracked cycle by cycle.
 //!
 //! ```text
 //! e = y − offset − Σk (ak·cos kθ + bk·sin kθ)     offset += µ·e     ak += 2µ·e·cos kθ     bk += 2µ·e·sin kθ
@@ -6,191 +6,193 @@
 //!
 //! (Widrow's adaptive noise canceller, 1975; each harmonic is a notch of width µ.) µ is the part of a revolution that a
 //! cycle turns, over the revolutions averaged, so it is the spindle's angle that counts and not time. White noise of
-//! variance σ² leaves µσ² in each coefficient. Between cycles the coefficients of an acceleration grow with the fourth
-//! power of speed, as what inertia forces do: force ∝ Ω², displacement ∝ Ω², acceleration ∝ Ω⁴.
+//! variance σ² leaves µσ² in each coefficient. When the speed changes the coefficients of an acceleration grow with its
+//! fourth power, as what inertia forces do: force ∝ Ω², displacement ∝ Ω², acceleration ∝ Ω⁴.
 
 use super::spindle::Wheel;
+use crate::cycle::lanes::{Lanes, flushed, sums};
 
-/// Vectors of four that hold all harmonics.
-pub const VECTORS: usize = 4;
-/// Adding and taking away this leaves nothing below 1e-17, long before it could be subnormal.
-const FLUSH: f32 = 1e-10;
+/// Pairs of harmonics: all sixteen.
+pub const PAIRS: usize = 8;
+/// Adding and taking away this leaves nothing of a coefficient below 1e-17, long before it could be subnormal.
+pub const FLUSH: f32 = 1e-10;
 /// A deviation beyond this many standard deviations counts as this many: a blow on the machine is not its vibration.
 const CLIP: f32 = 5.0;
+/// Smallest variance.
+const FLOOR: f32 = 1e-12;
 
-/// All of the news.
-const ALL: [Lanes; VECTORS] = [Lanes([1.0; 4]); VECTORS];
-
-/// Four numbers that one instruction handles.
+/// Coefficients of cos kθ and sin kθ, two harmonics in each: cos, sin, cos, sin.
 #[derive(Debug, Clone, Copy, Default)]
-#[repr(align(16))]
-pub struct Lanes(pub [f32; 4]);
-
-impl Lanes {
-    #[inline(always)]
-    fn with(self, other: Lanes, f: impl Fn(f32, f32) -> f32) -> Lanes {
-        let ([a, b, c, d], [e, g, h, i]) = (self.0, other.0);
-        Lanes([f(a, e), f(b, g), f(c, h), f(d, i)])
-    }
-
-    /// Lane by lane.
-    #[inline(always)]
-    #[must_use]
-    pub fn plus(self, other: Lanes) -> Lanes {
-        self.with(other, |a, b| a + b)
-    }
-
-    /// Lane by lane.
-    #[inline(always)]
-    #[must_use]
-    pub fn minus(self, other: Lanes) -> Lanes {
-        self.with(other, |a, b| a - b)
-    }
-
-    /// Lane by lane.
-    #[inline(always)]
-    #[must_use]
-    pub fn times(self, other: Lanes) -> Lanes {
-        self.with(other, |a, b| a * b)
-    }
-
-    #[inline(always)]
-    fn sum(self) -> f32 {
-        let [a, b, c, d] = self.0;
-        (a + c) + (b + d)
-    }
-}
-
-/// Coefficients of cos kθ and sin kθ.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Harmonics {
-    cos: [Lanes; VECTORS],
-    sin: [Lanes; VECTORS],
-}
+pub struct Harmonics(pub [Lanes; PAIRS]);
 
 impl Harmonics {
+    /// What is to be summed over the lanes for the value at the wheel's angle.
+    #[inline(always)]
+    fn parts(&self, wheel: &Wheel, pairs: usize) -> Lanes {
+        let mut products =
+            self.0.iter().zip(&wheel.0).take(pairs).map(|(coefficients, phases)| *coefficients * *phases);
+        let first = products.next().unwrap_or(Lanes::ZERO);
+        products.fold(first, |sum, product| sum + product)
+    }
+
     /// The value at the wheel's angle.
     #[inline(always)]
     #[must_use]
-    pub fn value(&self, wheel: &Wheel, vectors: usize) -> f32 {
-        let mut sum = Lanes::default();
-        for (((a, b), c), s) in self.cos.iter().zip(&self.sin).zip(&wheel.cos).zip(&wheel.sin).take(vectors) {
-            sum = sum.plus(a.times(*c)).plus(b.times(*s));
-        }
-        sum.sum()
+    pub fn value(&self, wheel: &Wheel, pairs: usize) -> f32 {
+        let [a, b, c, d] = self.parts(wheel, pairs).to_array();
+        (a + c) + (b + d)
     }
 
     /// Coefficients of a harmonic, counted from 0.
     #[inline(always)]
     #[must_use]
     pub fn get(&self, harmonic: usize) -> [f32; 2] {
-        let (vector, lane) = ((harmonic >> 2) & 3, harmonic & 3);
-        [self.cos[vector].0[lane], self.sin[vector].0[lane]]
+        let [a, b, c, d] = self.0[(harmonic >> 1) & (PAIRS - 1)].to_array();
+        if harmonic & 1 == 0 { [a, b] } else { [c, d] }
     }
 
     /// Sets them.
     #[inline(always)]
     pub fn set(&mut self, harmonic: usize, [cos, sin]: [f32; 2]) {
-        let (vector, lane) = ((harmonic >> 2) & 3, harmonic & 3);
-        self.cos[vector].0[lane] = cos;
-        self.sin[vector].0[lane] = sin;
+        let pair = &mut self.0[(harmonic >> 1) & (PAIRS - 1)];
+        let [a, b, c, d] = pair.to_array();
+        *pair = Lanes::new(if harmonic & 1 == 0 { [cos, sin, c, d] } else { [a, b, cos, sin] });
     }
 
     /// Adds a value at the wheel's angle: Fourier's sums.
     #[inline(always)]
-    pub fn gather(&mut self, wheel: &Wheel, vectors: usize, value: f32) {
-        self.learn(wheel, vectors, value, &ALL, 1.0);
+    pub fn gather(&mut self, wheel: &Wheel, pairs: usize, value: f32) {
+        let value = Lanes::splat(value);
+        for (coefficients, phases) in self.0.iter_mut().zip(&wheel.0).take(pairs) {
+            *coefficients = flushed(*coefficients + value * *phases, FLUSH);
+        }
     }
 
-    /// Moves each coefficient by `step` times its share, after growing all by `growth`.
+    /// Moves each coefficient by `step` times its share. Not flushed: whoever looks at a pair does that.
     #[inline(always)]
-    fn learn(&mut self, wheel: &Wheel, vectors: usize, step: f32, shares: &[Lanes; VECTORS], growth: f32) {
-        let (step, growth, flush) = (Lanes([step; 4]), Lanes([growth; 4]), Lanes([FLUSH; 4]));
-        let phases = wheel.cos.iter().zip(&wheel.sin).zip(shares);
-        for ((a, b), ((c, s), share)) in self.cos.iter_mut().zip(&mut self.sin).zip(phases).take(vectors) {
-            let step = step.times(*share);
-            *a = a.times(growth).plus(step.times(*c)).plus(flush).minus(flush);
-            *b = b.times(growth).plus(step.times(*s)).plus(flush).minus(flush);
+    fn learn(&mut self, wheel: &Wheel, pairs: usize, step: f32, shares: &[Lanes; PAIRS]) {
+        let step = Lanes::splat(step);
+        for ((coefficients, phases), share) in self.0.iter_mut().zip(&wheel.0).zip(shares).take(pairs) {
+            *coefficients += *share * step * *phases;
         }
     }
 }
 
-/// A signal as its offset and its harmonics.
+/// Two signals, each as its offset and its harmonics.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Tracker {
-    /// The harmonics, in the signal's unit.
-    pub harmonics: Harmonics,
+pub struct Trackers {
+    /// The harmonics, in the signals' unit.
+    pub harmonics: [Harmonics; 2],
     /// Share of a revolution's news that enters each harmonic.
-    shares: [Lanes; VECTORS],
+    pub shares: [[Lanes; PAIRS]; 2],
     /// What stays when they are gone; drifts are followed.
-    pub offset: f64,
+    pub offset: [f64; 2],
     /// Mean of the first revolution so far, above the offset.
-    mean: f64,
-    /// Variance of what is left.
-    pub variance: f32,
-    /// Turns for which the signal was not what the harmonics said, less those for which it was.
-    pub surprise: f32,
+    mean: [f64; 2],
+    /// Squares of the largest deviations that are believed in full; then of two values that are bounded beside them.
+    pub bounds: Lanes,
+    /// Turns for which a signal was not what the harmonics said, less those for which it was.
+    pub surprise: [f32; 2],
 }
 
-impl Tracker {
-    /// Share of a harmonic, counted from 0.
-    #[inline(always)]
+impl Trackers {
+    /// Of values that are bounded by `most` in size beside them.
     #[must_use]
-    pub fn share(&self, harmonic: usize) -> f32 {
-        self.shares[(harmonic >> 2) & 3].0[harmonic & 3]
+    pub fn bounding(most: f32) -> Trackers {
+        Trackers { bounds: Lanes::new([0.0, 0.0, most * most, most * most]), ..Trackers::default() }
     }
 
-    /// Sets it.
-    #[inline(always)]
-    pub fn set_share(&mut self, harmonic: usize, share: f32) {
-        self.shares[(harmonic >> 2) & 3].0[harmonic & 3] = share;
-    }
-
-    /// Begins anew from a first reading.
-    pub fn begin(&mut self, reading: f64) {
-        *self = Tracker { offset: reading, shares: ALL, ..Tracker::default() };
+    /// Begins anew from two first readings; harmonics from the one counted `asked` on are never learnt.
+    pub fn begin(&mut self, readings: [f64; 2], asked: usize) {
+        let share = |i: usize| if i < asked { 1.0 } else { 0.0 };
+        let all = core::array::from_fn(|i| Lanes::new([2 * i, 2 * i, 2 * i + 1, 2 * i + 1].map(share)));
+        *self = Trackers { offset: readings, shares: [all; 2], bounds: self.bounds, ..Trackers::default() };
+        self.set_variance([0.0; 2]);
     }
 
     /// A reading of the first revolution, of which it takes up `part`: Fourier's integrals, term by term.
-    #[inline(always)]
-    pub fn first(&mut self, wheel: &Wheel, vectors: usize, reading: f64, part: f64) {
-        let left = part * (reading - self.offset);
-        self.mean += left;
-        self.harmonics.gather(wheel, vectors, 2.0 * left as f32);
+    pub fn first(&mut self, wheel: &Wheel, pairs: usize, readings: [f64; 2], part: f64) {
+        for (n, reading) in readings.into_iter().enumerate() {
+            let left = part * (reading - self.offset[n]);
+            self.mean[n] += left;
+            let asked = 2.0 * left as f32;
+            self.harmonics[n].learn(wheel, pairs, asked, &self.shares[n]);
+        }
     }
 
     /// The first revolution is whole.
     pub fn known(&mut self) {
-        self.offset += self.mean;
-        self.mean = 0.0;
+        for n in 0..2 {
+            self.offset[n] += self.mean[n];
+            self.mean[n] = 0.0;
+        }
     }
 
-    /// A later reading. `share` is µ, `turning` the part of a turn that each harmonic takes its own share of; `growth` what
-    /// the harmonics grow by until the next one; `turned` is `turning`, or 0 as long as the variance is not known.
+    /// Variance of what is left of each signal.
     #[inline(always)]
-    pub fn read(
-        &mut self,
-        wheel: &Wheel,
-        vectors: usize,
-        reading: f64,
-        [share, turning]: [f32; 2],
-        growth: f32,
-        turned: f32,
-    ) {
-        let left = (reading - self.offset) as f32 - self.harmonics.value(wheel, vectors);
-        let mut left = (left + FLUSH) - FLUSH;
-        let most = CLIP * CLIP * self.variance;
-        let mut square = left * left;
-        let calmer = self.surprise - turned;
-        self.surprise = if calmer > 0.0 { calmer } else { 0.0 };
-        if square > most && turned > 0.0 {
-            left *= (most / square).sqrt();
-            square = most;
-            self.surprise += 2.0 * turned;
+    #[must_use]
+    pub fn variance(&self) -> [f32; 2] {
+        let [a, b, ..] = self.bounds.to_array();
+        [a / (CLIP * CLIP), b / (CLIP * CLIP)]
+    }
+
+    fn set_variance(&mut self, variance: [f32; 2]) {
+        let ([a, b], [.., c, d]) = (variance.map(|x| CLIP * CLIP * x), self.bounds.to_array());
+        self.bounds = Lanes::new([a, b, c, d]);
+    }
+
+    /// What the harmonics leave of two readings, then what two others say at the wheel's angle, with their signs turned.
+    #[inline(always)]
+    #[must_use]
+    pub fn left(&self, wheel: &Wheel, pairs: usize, readings: [f64; 2], others: &[Harmonics; 2]) -> Lanes {
+        let [a, b] = &self.harmonics;
+        let [c, d] = others;
+        let (first, second) = (readings[0] - self.offset[0], readings[1] - self.offset[1]);
+        let others = [c.parts(wheel, pairs), d.parts(wheel, pairs)];
+        let known = sums([a.parts(wheel, pairs), b.parts(wheel, pairs)], others);
+        Lanes::new([first as f32, second as f32, 0.0, 0.0]) - known
+    }
+
+    /// Deviations with those beyond belief cut down, after `turned` turns.
+    pub fn believed(&mut self, left: Lanes, turned: f32) -> Lanes {
+        let (mut believed, most) = (left.to_array(), self.bounds.to_array());
+        for n in 0..2 {
+            let calmer = self.surprise[n] - turned;
+            self.surprise[n] = if calmer > 0.0 { calmer } else { 0.0 };
+            let square = believed[n] * believed[n];
+            if square > most[n] {
+                believed[n] *= (most[n] / square).sqrt();
+                self.surprise[n] += 2.0 * turned;
+            }
         }
-        // The floor keeps a noiseless signal from a variance that it could never leave.
-        self.variance += share * (square - self.variance) + 1e-12 * share;
-        self.offset += f64::from(share * left);
-        self.harmonics.learn(wheel, vectors, 2.0 * turning * left, &self.shares, growth);
+        Lanes::new(believed)
+    }
+
+    /// Takes up what was left: `share` is µ, `turning` the part of a turn that each harmonic takes its own share of.
+    #[inline(always)]
+    pub fn learn(&mut self, wheel: &Wheel, pairs: usize, left: Lanes, [share, turning]: [f32; 2]) {
+        let shares = Lanes::new([share, share, 0.0, 0.0]);
+        self.bounds += shares * (left * left * Lanes::splat(CLIP * CLIP) - self.bounds);
+        let [a, b, ..] = (shares * left).to_array();
+        self.offset[0] += f64::from(a);
+        self.offset[1] += f64::from(b);
+        let [a, b, ..] = (Lanes::splat(turning + turning) * left).to_array();
+        for (n, step) in [a, b].into_iter().enumerate() {
+            self.harmonics[n].learn(wheel, pairs, step, &self.shares[n]);
+        }
+    }
+
+    /// Lets no variance fall below one that a noiseless signal could leave again.
+    #[inline(always)]
+    pub fn keep_floor(&mut self) {
+        self.bounds = self.bounds.fast_max(Lanes::splat(CLIP * CLIP * FLOOR));
+    }
+}
+
+/// Makes harmonics larger by a factor, as a change of speed does.
+#[inline(always)]
+pub fn grow(harmonics: &mut [Harmonics; 2], pairs: usize, factor: f32) {
+    for one in harmonics {
+        one.0.iter_mut().take(pairs).for_each(|pair| *pair *= Lanes::splat(factor));
     }
 }

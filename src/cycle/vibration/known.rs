@@ -10,54 +10,58 @@
 //! amplitude drifts by in a revolution, from the change of speed. A strong harmonic follows fast, a weak one is averaged
 //! long. µm, µm².
 
+use crate::cycle::lanes::{Lanes, flushed, paired};
+
 /// A harmonic counts in full when its power is far above what noise leaves in it. The power is averaged twice as long
 /// as the harmonic itself, so that noise alone seldom exceeds its own mean by this.
 const NOISE_MARGIN: f32 = 1.5;
 /// Power above which a harmonic that has just come is believed at once, in powers of its noise.
 const SUDDEN: f32 = 10.0;
 
-/// One harmonic of one sensor.
+/// Powers and averages below this are none, long before they could be subnormal.
+const FLUSH: f32 = 1e-10;
+
+/// Two harmonics of one sensor: x and y of each.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Known {
-    /// Mean square, with its noise.
-    power: f32,
+    /// Mean square, with its noise, in both lanes of a harmonic.
+    power: Lanes,
     /// The displacement averaged once more.
-    slow: [f32; 2],
+    slow: Lanes,
+    /// The displacement put ahead of its lag.
+    now: Lanes,
 }
 
 impl Known {
     /// Takes up a displacement that averaged `news` of itself since the last time, and puts it ahead of its lag: what lags
     /// behind a ramp by one average lags by two after another (Brown's double smoothing). `ahead`: 0 to 1.
     #[inline(always)]
-    pub fn look(&mut self, [x, y]: [f32; 2], news: f32, ahead: f32) -> [f32; 2] {
-        let news = if news < 1.0 { news } else { 1.0 };
-        let [u, v] = &mut self.slow;
-        *u += news * (x - *u);
-        *v += news * (y - *v);
-        let ahead = if ahead > 0.0 { ahead } else { 0.0 };
-        let now = [x + ahead * (x - *u), y + ahead * (y - *v)];
-        self.power += 0.5 * news * (now[0] * now[0] + now[1] * now[1] - self.power);
-        now
+    pub fn look(&mut self, now: Lanes, news: Lanes, ahead: Lanes) {
+        let news = news.fast_min(Lanes::ONE);
+        self.slow = flushed(self.slow + news * (now - self.slow), FLUSH);
+        self.now = now + ahead.fast_max(Lanes::ZERO) * (now - self.slow);
+        let square = paired(self.now * self.now);
+        self.power = flushed(self.power + Lanes::splat(0.5) * news * (square - self.power), FLUSH);
     }
 
     /// The displacement, less what a noise of some mean square explains.
     #[inline(always)]
-    pub fn believed(&mut self, [x, y]: [f32; 2], noise: f32) -> [f32; 2] {
-        let square = x * x + y * y;
-        if square > self.power + SUDDEN * noise {
-            self.power = square;
-        }
-        let left = self.power - NOISE_MARGIN * noise;
-        let part = if left > 0.0 { left / self.power } else { 0.0 };
-        [part * x, part * y]
+    #[must_use]
+    pub fn believed(&mut self, noise: Lanes) -> Lanes {
+        let square = paired(self.now * self.now);
+        let sudden = square.simd_gt(self.power + Lanes::splat(SUDDEN) * noise);
+        self.power = sudden.bitselect(square, self.power);
+        // Where there is no power there is nothing left of it either; the smallest one keeps the quotient finite.
+        let left = (self.power - Lanes::splat(NOISE_MARGIN) * noise).fast_max(Lanes::ZERO);
+        left / self.power.fast_max(Lanes::splat(1e-30)) * self.now
     }
 
     /// Share of a revolution's news to let in from now on, `least` to 1.
     #[inline(always)]
-    pub fn share(&self, drift: f32, noise: f32, least: f32) -> f32 {
+    #[must_use]
+    pub fn share(&self, drift: f32, noise: Lanes, least: f32) -> Lanes {
         // N below any sensor's keeps the quotient finite.
-        let best = drift * (self.power / (noise + 1e-12)).sqrt();
-        let best = if best > least { best } else { least };
-        if best < 1.0 { best } else { 1.0 }
+        let best = Lanes::splat(drift) * (self.power / (noise + Lanes::splat(1e-12))).sqrt();
+        best.fast_max(Lanes::splat(least)).fast_min(Lanes::ONE)
     }
 }

@@ -8,16 +8,19 @@
 //! they are not: nothing it does is a jump. A bad sensor is not read; its last harmonics go on turning until the
 //! correction has faded out. In every other state, and whatever happens, the position is the plain scale.
 
-use super::config::GIB_VIBRATION_HARMONICS;
-use super::harmonic::{Harmonics, Tracker};
+mod quick;
+mod renew;
+
+use super::harmonic::{Harmonics, PAIRS, Trackers, grow};
 use super::integrate::Integrator;
 use super::io::*;
 use super::known::Known;
 use super::plan::Plan;
-use super::sensor::Sensor;
+use super::sensor::Sensors;
 use super::spindle::{Spindle, Wheel};
 use crate::cycle::backlash::io::GIB_INPUT_ABORT;
 use crate::error::*;
+use renew::Renewal;
 
 /// Where the machine is. Each comment says what ends the state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,11 +35,10 @@ enum Phase {
     Failed,
 }
 
+/// Pairs of harmonics that are enough for most; else all are computed.
+const FEW: usize = PAIRS / 2;
 /// Reasons that a sensor or the angle gives: the harmonics must be learnt anew.
 const BAD: u32 = !(GIB_VIBRATION_NO_REVOLUTION | GIB_VIBRATION_NO_ROTATION);
-/// Drift of an amplitude in a revolution per relative change of speed in it, beside what inertia forces do: a middle between a
-/// machine without resonances, 0, and one at a resonance of 4 % damping, 12.
-const SWING: f32 = 2.5;
 /// Turns of readings far off the harmonics after which they are no longer believed.
 const SURPRISE: f32 = 0.5;
 
@@ -53,8 +55,9 @@ pub struct Vibration {
     blend: f64,
     /// Position put out last.
     position: f64,
-    /// Harmonic whose displacement is renewed in this cycle, counted from 0.
-    next: usize,
+    /// Pairs of harmonics of the cycles that are all alike, see [`quick`]; 0 while they are not.
+    usual: usize,
+    renewal: Renewal,
     /// Share of a revolution's news that enters a harmonic while the speed is steady.
     part: f32,
     /// Relative change of speed in a revolution, averaged over one.
@@ -62,12 +65,13 @@ pub struct Vibration {
     degraded: u64,
     seen: u32,
     spindle: Spindle,
-    sensors: [Sensor; 2],
-    trackers: [Tracker; 2],
-    /// The second slide's position, µm from where it stood first.
-    slide: Tracker,
-    /// What is known of each harmonic of seat and bearing beside its value.
-    known: [[Known; GIB_VIBRATION_HARMONICS]; 2],
+    sensors: Sensors,
+    /// Accelerations of seat and bearing.
+    trackers: Trackers,
+    /// The second slide's position, µm from where it stood first, and a signal that is not there.
+    slide: Trackers,
+    /// What is known of each pair of harmonics of seat and bearing beside its value.
+    known: [[Known; PAIRS]; 2],
     /// Displacement of seat and bearing, µm.
     displacement: [Harmonics; 2],
     integrators: [Integrator; 2],
@@ -85,16 +89,17 @@ impl Default for Vibration {
             revolution: 1.0,
             blend: 0.0,
             position: 0.0,
-            next: 0,
+            usual: 0,
+            renewal: Renewal::default(),
             part: 0.0,
             swing: 0.0,
             degraded: 0,
             seen: 0,
             spindle: Spindle::default(),
-            sensors: [Sensor::default(); 2],
-            trackers: [Tracker::default(); 2],
-            slide: Tracker::default(),
-            known: [[Known::default(); GIB_VIBRATION_HARMONICS]; 2],
+            sensors: Sensors::default(),
+            trackers: Trackers::default(),
+            slide: Trackers::default(),
+            known: [[Known::default(); PAIRS]; 2],
             displacement: [Harmonics::default(); 2],
             integrators: [Integrator::default(); 2],
             held: [0.0; 2],
@@ -112,6 +117,7 @@ impl Vibration {
             return Err(Fault::of(GIB_ERR_STATE));
         }
         *self = Vibration { plan: plan?, phase: Phase::Running, position: self.position, ..Vibration::default() };
+        self.trackers = Trackers::bounding(self.plan.displacement_max as f32);
         Ok(())
     }
 
@@ -140,9 +146,29 @@ impl Vibration {
         self.position
     }
 
-    /// One servo cycle.
+    /// One servo cycle; returns the status.
     #[inline(always)]
-    pub fn step(&mut self, input: &VibrationInput, output: &mut VibrationOutput) {
+    pub fn step(&mut self, input: &VibrationInput, output: &mut VibrationOutput) -> i32 {
+        let usual = self.usual;
+        // The status as a number of each way, so that nothing is left to do after `careful`.
+        match usual {
+            FEW if self.quick::<FEW>(input, output) => GIB_BUSY,
+            PAIRS if self.quick::<PAIRS>(input, output) => GIB_BUSY,
+            0 if self.phase == Phase::Idle && self.idle(input, output) => GIB_OK,
+            _ => self.careful(input, output),
+        }
+    }
+
+    /// Any cycle, with all that can happen in one.
+    #[inline(never)]
+    fn careful(&mut self, input: &VibrationInput, output: &mut VibrationOutput) -> i32 {
+        self.any(input, output);
+        output.status
+    }
+
+    #[inline(always)]
+    fn any(&mut self, input: &VibrationInput, output: &mut VibrationOutput) {
+        self.usual = 0;
         let plain = if self.plan.second_slide { input.scale_mm + input.second_slide_mm } else { input.scale_mm };
         if !plain.is_finite() {
             return self.blind(input, output);
@@ -159,15 +185,13 @@ impl Vibration {
             if self.plan.integrate { self.integrated(input, reasons) } else { self.tracked(input, reasons) };
         let reasons = reasons | self.implausible([seat, bearing]);
         self.put_out(plain, [seat, bearing], reasons, output);
+        self.see_usual();
     }
 
     /// Why the correction cannot be in force, as far as spindle and sensors are concerned.
-    #[inline(always)]
     fn look(&mut self, input: &VibrationInput, turns: bool) -> u32 {
-        let [a1, a2] = input.acceleration_m_s2;
         let turned = self.spindle.turned;
-        let [seat, bearing] = &mut self.sensors;
-        let mut reasons = seat.check(&self.plan, a1, turned) | bearing.check(&self.plan, a2, turned) << 8;
+        let mut reasons = self.sensors.check(&self.plan, input.acceleration_m_s2, turned);
         if !turns {
             reasons |= GIB_VIBRATION_BAD_ANGLE;
         }
@@ -187,123 +211,90 @@ impl Vibration {
     }
 
     /// Displacements by harmonics, µm.
-    #[inline(always)]
     fn tracked(&mut self, input: &VibrationInput, reasons: u32) -> [f64; 2] {
-        let vectors = self.plan.vectors;
-        let wheel = self.spindle.wheel(vectors);
-        if self.phase != Phase::Running {
-            // What fades out is what was known.
-        } else if reasons == 0 {
-            self.learn(input, &wheel);
-            self.renew();
-        } else if reasons == GIB_VIBRATION_NO_REVOLUTION {
-            self.learn_first(input, &wheel);
+        if self.plan.pairs == FEW {
+            self.tracked_by::<FEW>(input, reasons)
+        } else {
+            self.tracked_by::<PAIRS>(input, reasons)
         }
-        let [seat, bearing] = &self.displacement;
-        [seat.value(&wheel, vectors).into(), bearing.value(&wheel, vectors).into()]
     }
 
-    /// Both accelerations and the second slide, with their readings.
-    #[inline(always)]
-    fn signals(&mut self, input: &VibrationInput) -> impl Iterator<Item = (&mut Tracker, f64)> {
-        let [a1, a2] = input.acceleration_m_s2;
-        let all = self.trackers.iter_mut().chain([&mut self.slide]).zip([a1, a2, 1e3 * input.second_slide_mm]);
-        all.take(if self.plan.second_slide { 3 } else { 2 })
+    fn tracked_by<const N: usize>(&mut self, input: &VibrationInput, reasons: u32) -> [f64; 2] {
+        let wheel = self.spindle.wheel(N);
+        if self.phase == Phase::Running && reasons == 0 {
+            self.learn::<N>(input, &wheel);
+            self.renew_pair();
+        } else {
+            // What does not learn has nothing that could grow with the speed; what fades out is what was known.
+            self.spindle.change(&self.plan);
+            if self.phase == Phase::Running && reasons == GIB_VIBRATION_NO_REVOLUTION {
+                self.learn_first::<N>(input, &wheel);
+            }
+        }
+        let [seat, bearing] = &self.displacement;
+        [seat.value(&wheel, N).into(), bearing.value(&wheel, N).into()]
+    }
+
+    /// Both accelerations and, where there is one, the second slide, with their readings.
+    fn signals(&mut self, input: &VibrationInput) -> impl Iterator<Item = (&mut Trackers, [f64; 2])> {
+        let all =
+            [(&mut self.trackers, input.acceleration_m_s2), (&mut self.slide, [1e3 * input.second_slide_mm, 0.0])];
+        all.into_iter().take(if self.plan.second_slide { 2 } else { 1 })
     }
 
     /// The first revolution, from which the harmonics start.
-    fn learn_first(&mut self, input: &VibrationInput, wheel: &Wheel) {
-        let (vectors, part) = (self.plan.vectors, self.spindle.turned.abs());
+    fn learn_first<const N: usize>(&mut self, input: &VibrationInput, wheel: &Wheel) {
+        let (asked, part) = (self.plan.harmonics, self.spindle.turned.abs());
         let begins = self.progress <= part;
-        for (tracker, reading) in self.signals(input) {
+        for (trackers, readings) in self.signals(input) {
             if begins {
-                tracker.begin(reading);
+                trackers.begin(readings, asked);
             }
-            tracker.first(wheel, vectors, reading, part);
+            trackers.first(wheel, N, readings, part);
         }
     }
 
     /// The rest of the first revolution, at the cycle that ends it.
     #[cold]
-    fn end_first(&mut self, input: &VibrationInput, wheel: &Wheel) {
+    fn end_first<const N: usize>(&mut self, input: &VibrationInput, wheel: &Wheel) {
         self.revolution = f64::INFINITY;
-        let (vectors, part) = (self.plan.vectors, 1.0 - (self.progress - self.spindle.turned.abs()));
-        for (tracker, reading) in self.signals(input) {
-            tracker.first(wheel, vectors, reading, part);
-            tracker.known();
+        self.part = 1.0;
+        let part = 1.0 - (self.progress - self.spindle.turned.abs());
+        for (trackers, readings) in self.signals(input) {
+            trackers.first(wheel, N, readings, part);
+            trackers.known();
         }
     }
 
     /// Follows the harmonics from then on.
-    #[inline(always)]
-    fn learn(&mut self, input: &VibrationInput, wheel: &Wheel) {
+    fn learn<const N: usize>(&mut self, input: &VibrationInput, wheel: &Wheel) {
+        let change = self.spindle.change(&self.plan);
         if self.revolution == 1.0 {
-            return self.end_first(input, wheel);
+            return self.end_first::<N>(input, wheel);
         }
-        let plan = &self.plan;
-        // First in a hurry, then by the average over the revolutions asked for.
-        let settled = self.progress * plan.share_min >= 2.0;
-        let turning = self.spindle.turned.abs();
-        self.swing += self.spindle.change - turning * self.swing;
-        let part = if settled { plan.share_min } else { 2.0 / self.progress };
-        self.part = part as f32;
-        let turning = if turning < plan.share_max { turning } else { plan.share_max } as f32;
-        let share = turning * self.part;
-        let growth = (1.0 + 4.0 * self.spindle.change) as f32;
-        let turned = if self.progress > 3.0 { turning } else { 0.0 };
-        for (tracker, reading) in self.trackers.iter_mut().zip(input.acceleration_m_s2) {
-            tracker.read(wheel, plan.vectors, reading, [share, turning], growth, turned);
+        self.swing += change;
+        let turning = self.turning(self.spindle.turned);
+        let shares = [turning * self.part, turning];
+        let (displacement, progress) = (self.displacement, self.progress);
+        for (trackers, readings) in self.signals(input) {
+            let mut left = trackers.left(wheel, N, readings, &displacement);
+            // Until then the variance is not known.
+            if progress > 3.0 {
+                left = trackers.believed(left, turning);
+            }
+            trackers.learn(wheel, N, left, shares);
         }
-        if plan.second_slide {
-            self.slide.read(wheel, plan.vectors, 1e3 * input.second_slide_mm, [share, turning], 1.0, turned);
+        if change != 0.0 {
+            grow(&mut self.trackers.harmonics, N, (1.0 + 4.0 * change) as f32);
+            grow(&mut self.displacement, N, (1.0 + 2.0 * change) as f32);
         }
     }
 
-    /// Renews the displacements of one harmonic: divided by −ω², calibrated, and less what noise explains.
+    /// Part of a turn that a cycle counts for: no more than the trackers can bear.
     #[inline(always)]
-    fn renew(&mut self) {
-        let plan = &self.plan;
-        let i = self.next;
-        self.next = if i + 1 < 4 * plan.vectors { i + 1 } else { 0 };
-        let turning = self.spindle.rate.abs();
-        let rate = (i + 1) as f64 * turning;
-        let slow = (rate as f32) < plan.tracked[0] || turning < plan.rate_min;
-        if slow || rate as f32 >= plan.tracked[1] || i >= plan.harmonics {
-            return self.leave_out(i, slow);
-        }
-        let to_um = plan.to_um / (rate * rate) as f32;
-        let gain = plan.gain(rate).0;
-        let sense = if self.spindle.rate < 0.0 { -1.0 } else { 1.0 };
-        let drift = SWING * self.swing.abs() as f32;
-        let place = i & (GIB_VIBRATION_HARMONICS - 1);
-        for (n, [re, im]) in [[gain[0], sense * gain[1]], [gain[2], sense * gain[3]]].into_iter().enumerate() {
-            let tracker = &mut self.trackers[n];
-            let [a, b] = tracker.harmonics.get(i);
-            let (mut x, mut y) = (to_um * (re * a + im * b), to_um * (re * b - im * a));
-            if n == GIB_VIBRATION_SEAT && plan.second_slide {
-                let [a, b] = self.slide.harmonics.get(i);
-                (x, y) = (x - a, y - b);
-            }
-            // What noise leaves in an average over one revolution, and what of the news was let in.
-            let noise = 2.0 * to_um * to_um * turning as f32 * tracker.variance;
-            let share = tracker.share(i);
-            let seen = &mut self.known[n][place];
-            let [x, y] = seen.look([x, y], turning as f32 * share * (4 * plan.vectors) as f32, share - self.part);
-            self.displacement[n].set(i, seen.believed([x, y], noise * share));
-            tracker.set_share(i, seen.share(drift, noise, self.part));
-        }
-    }
-
-    /// A harmonic that is not asked for, or too slow or too fast for the sensors, has no displacement.
-    fn leave_out(&mut self, i: usize, slow: bool) {
-        for displacement in &mut self.displacement {
-            displacement.set(i, [0.0; 2]);
-        }
-        if !slow {
-            for tracker in self.trackers.iter_mut().chain([&mut self.slide]) {
-                tracker.harmonics.set(i, [0.0; 2]);
-            }
-        }
+    fn turning(&self, turned: f64) -> f32 {
+        let (turning, most) = (turned.abs() as f32, self.plan.share_max);
+        if turning < most { turning } else { most }
     }
 
     /// Displacements by integration, µm.
@@ -316,10 +307,10 @@ impl Vibration {
             let late = self.plan.cycle * (self.progress - self.revolution) / self.spindle.turned.abs();
             self.revolution += 1.0;
             self.integrators.iter_mut().for_each(|integrator| integrator.close(late));
-            self.slide.offset = 1e3 * input.second_slide_mm;
+            self.slide.offset[0] = 1e3 * input.second_slide_mm;
         }
         let rate = self.plan.main * self.spindle.rate;
-        let gain = self.plan.gain(rate.abs()).0.map(f64::from);
+        let gain = self.plan.gain(rate.abs()).to_array().map(f64::from);
         // j·x of a sinusoid is its velocity over ω.
         let per_omega = self.plan.cycle / (core::f64::consts::TAU * rate);
         let mut out = [0.0; 2];
@@ -327,7 +318,7 @@ impl Vibration {
             let [way, speed] = integrator.read(input.acceleration_m_s2[n], self.plan.cycle);
             let mut way = 1e6 * way;
             if n == GIB_VIBRATION_SEAT && self.plan.second_slide {
-                way -= 1e3 * input.second_slide_mm - self.slide.offset;
+                way -= 1e3 * input.second_slide_mm - self.slide.offset[0];
             }
             let [re, im] = [gain[2 * n], gain[2 * n + 1]];
             out[n] = re * way + im * 1e6 * speed * per_omega;
@@ -339,11 +330,10 @@ impl Vibration {
     }
 
     /// A displacement that no machine has, or an acceleration that is suddenly another: it is learnt anew.
-    #[inline(always)]
     fn implausible(&mut self, displacement: [f64; 2]) -> u32 {
         let most = self.plan.displacement_max;
         let [seat, bearing] =
-            [0, 1].map(|i: usize| displacement[i].abs() > most || self.trackers[i].surprise > SURPRISE);
+            [0, 1].map(|i: usize| displacement[i].abs() > most || self.trackers.surprise[i] > SURPRISE);
         if !(seat || bearing) || self.progress < 1.0 {
             return 0;
         }
@@ -354,7 +344,6 @@ impl Vibration {
     }
 
     /// Blends, and writes the output.
-    #[inline(always)]
     fn put_out(&mut self, plain: f64, displacement: [f64; 2], reasons: u32, output: &mut VibrationOutput) {
         let wanted = reasons == 0 && self.phase == Phase::Running;
         let blend = self.blend + if wanted { self.plan.fade } else { -self.plan.fade };
@@ -451,14 +440,15 @@ impl Vibration {
     fn leave(&mut self, fault: Fault) {
         self.fault = fault;
         self.phase = Phase::Stopping;
+        self.usual = 0;
     }
 
     /// What is known of the vibration.
     #[must_use]
     pub fn report(&self) -> VibrationReport {
         let mut report = VibrationReport {
-            offset_m_s2: self.trackers.map(|t| t.offset),
-            noise_m_s2: self.trackers.map(|t| f64::from(t.variance).sqrt()),
+            offset_m_s2: self.trackers.offset,
+            noise_m_s2: self.trackers.variance().map(|v| f64::from(v).sqrt()),
             speed_rpm: self.spindle.rate * self.plan.to_rpm,
             revolutions: self.progress,
             degraded_cycles: self.degraded,

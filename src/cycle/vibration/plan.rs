@@ -1,12 +1,15 @@
 //! The configuration of a correction, checked once and turned into the constants of a cycle.
 
 use super::config::{GIB_VIBRATION_HARMONICS, VibrationConfig};
-use super::harmonic::Lanes;
 use crate::cycle::calibration::table::CalibrationTable;
+use crate::cycle::lanes::Lanes;
 use crate::error::{Fault, in_range};
+use wide::f64x2;
 
 /// Cells of the grid on which the calibration's gains are laid out.
 const CELLS: usize = 128;
+/// Adding this rounds a number to a whole one, which then stands in the lowest bits.
+const ROUNDING: f64 = 1.5 * (1u64 << 52) as f64;
 /// Samples that a period of the highest tracked harmonic has at least: 1/0.4.
 const NYQUIST: f64 = 0.4;
 
@@ -19,8 +22,8 @@ pub struct Plan {
     pub second_slide: bool,
     /// Harmonics tracked.
     pub harmonics: usize,
-    /// Vectors of four that they take.
-    pub vectors: usize,
+    /// Pairs of harmonics that are computed: four or eight.
+    pub pairs: usize,
     /// Servo period, s.
     pub cycle: f64,
     /// Share of a cycle's turn in the filtered speed.
@@ -29,10 +32,10 @@ pub struct Plan {
     pub rate_min: f64,
     /// Largest turn in a cycle.
     pub turn_max: f64,
-    /// Acceleration at which a sensor is saturated, and the largest plausible one, m/s².
+    /// Acceleration at which a sensor is saturated, and the largest plausible one of either, m/s².
     pub saturation: f64,
     /// See `saturation`.
-    pub acceleration_max: f64,
+    pub acceleration_max: f64x2,
     /// Largest plausible displacement, µm.
     pub displacement_max: f64,
     /// Rates of harmonics between which an acceleration is worth a displacement.
@@ -40,9 +43,9 @@ pub struct Plan {
     /// Change of the blend in a cycle.
     pub fade: f64,
     /// Part of a turn's news that enters the harmonics once they are known.
-    pub share_min: f64,
+    pub share_min: f32,
     /// Largest share, at which the tracker is well stable.
-    pub share_max: f64,
+    pub share_max: f32,
     /// Displacement in µm is acceleration times this over (harmonic · rate)².
     pub to_um: f32,
     /// rpm per turn per cycle.
@@ -61,13 +64,13 @@ impl Plan {
         integrate: false,
         second_slide: false,
         harmonics: 0,
-        vectors: 0,
+        pairs: 0,
         cycle: 1e-3,
         speed_share: 1.0,
         rate_min: 1.0,
         turn_max: 0.0,
         saturation: 0.0,
-        acceleration_max: 0.0,
+        acceleration_max: f64x2::ZERO,
         displacement_max: 0.0,
         tracked: [1.0, 0.0],
         fade: 1.0,
@@ -77,7 +80,7 @@ impl Plan {
         to_rpm: 0.0,
         main: 1.0,
         cells: 0.0,
-        gains: [Lanes([1.0, 0.0, 1.0, 0.0]); CELLS + 1],
+        gains: [Lanes::new([1.0, 0.0, 1.0, 0.0]); CELLS + 1],
     };
 
     /// Checks every field and derives the constants of a cycle; without a table both sensors are believed as they are.
@@ -105,7 +108,7 @@ impl Plan {
             integrate: whole("method\0", c.method, 0.0, 1.0)? != 0.0,
             second_slide: whole("second_slide\0", c.second_slide, 0.0, 1.0)? != 0.0,
             harmonics: harmonics as usize,
-            vectors: (harmonics as usize).div_ceil(4),
+            pairs: if harmonics > 8.0 { 8 } else { 4 },
             cycle,
             speed_share: cycle / filter,
             rate_min: slow / 60.0 * cycle,
@@ -113,12 +116,14 @@ impl Plan {
             turn_max: (1.25 * fast / 60.0 * cycle).min(0.3),
             // One part in a thousand below full scale: the last step of a 16 bit converter, and its offset.
             saturation: 0.999 * range,
-            acceleration_max: in_range("acceleration_max_m_s2\0", plausible, 1e-3, range)?.min(0.998 * range),
+            acceleration_max: f64x2::splat(
+                in_range("acceleration_max_m_s2\0", plausible, 1e-3, range)?.min(0.998 * range),
+            ),
             displacement_max: in_range("displacement_max_um\0", or(c.displacement_max_um, 100.0), 0.1, 1e4)?,
             tracked: [(low * cycle) as f32, NYQUIST as f32],
             fade: (cycle / fade).min(1.0),
-            share_min: 1.0 / averaging,
-            share_max: 1.0 / (2.0 * harmonics + 2.0),
+            share_min: (1.0 / averaging) as f32,
+            share_max: (1.0 / (2.0 * harmonics + 2.0)) as f32,
             to_um: (-1e6 * (cycle / core::f64::consts::TAU).powi(2)) as f32,
             to_rpm: 60.0 / cycle,
             main,
@@ -131,7 +136,7 @@ impl Plan {
             plan.cells = CELLS as f64 / (last * cycle);
             for (i, gain) in plan.gains.iter_mut().enumerate() {
                 let [[a, b], [c, d]] = table.gains(last * i as f64 / CELLS as f64);
-                *gain = Lanes([a, b, c, d].map(|x| x as f32));
+                *gain = Lanes::new([a, b, c, d].map(|x| x as f32));
             }
         }
         Ok(plan)
@@ -142,11 +147,16 @@ impl Plan {
     #[must_use]
     pub fn gain(&self, rate: f64) -> Lanes {
         let place = rate * self.cells;
-        let cell = if place < (CELLS - 1) as f64 { place as i32 as usize } else { CELLS - 1 };
-        let part = (place - cell as f64) as f32;
+        let last = CELLS as f64 - 0.25;
+        let inside = if place < last { place } else { last };
+        // The cell whose middle is nearest; `as usize` would look for overflows first.
+        let cell = (inside - 0.5 + ROUNDING).to_bits() as usize & (2 * CELLS - 1);
+        let part = (place - f64::from(cell as i32)) as f32;
         let part = if part < 1.0 { part } else { 1.0 };
-        let (from, to) = (self.gains[cell.min(CELLS - 1)], self.gains[cell.min(CELLS - 1) + 1]);
-        from.plus(to.minus(from).times(Lanes([part; 4])))
+        match (self.gains.get(cell), self.gains.get(cell + 1)) {
+            (Some(from), Some(to)) => *from + (*to - *from) * Lanes::splat(part),
+            _ => Lanes::new([1.0, 0.0, 1.0, 0.0]),
+        }
     }
 }
 
@@ -171,7 +181,7 @@ mod tests {
     #[test]
     fn zero_means_default_and_what_is_wrong_is_named() {
         let plan = Plan::new(&valid(), None).unwrap();
-        assert!(plan.harmonics == 8 && plan.vectors == 2 && !plan.integrate && plan.share_min == 0.0625);
+        assert!(plan.harmonics == 8 && plan.pairs == 4 && !plan.integrate && plan.share_min == 0.0625);
         for (config, field) in [
             (VibrationConfig { cycle_s: 0.0, ..valid() }, "cycle_s\0"),
             (VibrationConfig { acceleration_range_m_s2: 0.0, ..valid() }, "acceleration_range_m_s2\0"),
@@ -201,7 +211,7 @@ mod tests {
         let plan = Plan::new(&valid(), Some(&table)).unwrap();
         for f in [0.0, 7.0, 20.0, 31.3, 47.0, 60.0, 61.0, 900.0] {
             let [[a, b], [c, d]] = table.gains(f);
-            let found = plan.gain(f * 0.0005).0.map(f64::from);
+            let found = plan.gain(f * 0.0005).to_array().map(f64::from);
             for (x, y) in found.iter().zip([a, b, c, d]) {
                 assert!((x - y).abs() < 5e-4, "{f} Hz: {found:?}");
             }

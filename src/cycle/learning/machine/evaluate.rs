@@ -64,8 +64,8 @@ impl Learning {
             self.report.peak_um = self.report.peak_um.max(seen.abs().into());
         }
         if !self.plan.published {
-            let wheel = Wheel::at(angle(i, self.plan.points), self.plan.vectors);
-            self.spectrum.gather(&wheel, self.plan.vectors, bin.deviation);
+            let wheel = Wheel::at(angle(i, self.plan.points), self.plan.pairs);
+            self.spectrum.gather(&wheel, self.plan.pairs, bin.deviation);
         }
     }
 
@@ -178,9 +178,9 @@ impl Learning {
     }
 
     fn synthesise(&mut self, i: usize) {
-        let vectors = self.plan.vectors;
-        let wheel = Wheel::at(angle(i, self.plan.points), vectors);
-        let (value, slope) = (self.spectrum.value(&wheel, vectors), self.steep.value(&wheel, vectors));
+        let pairs = self.plan.pairs;
+        let wheel = Wheel::at(angle(i, self.plan.points), pairs);
+        let (value, slope) = (self.spectrum.value(&wheel, pairs), self.steep.value(&wheel, pairs));
         self.report.correction_um = self.report.correction_um.max(value.abs().into());
         if let Some(cell) = self.tables[(self.front ^ 1) & 1].get_mut(i) {
             *cell = Cell { value: (value + 1e-10) - 1e-10, slope: (slope + 1e-10) - 1e-10 };

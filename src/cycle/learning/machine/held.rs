@@ -3,10 +3,8 @@
 use super::*;
 use crate::cycle::calibration::solve::Complex;
 use crate::cycle::learning::points::{angle, close};
+use crate::cycle::vibration::harmonic::PAIRS;
 use crate::cycle::vibration::spindle::Wheel;
-
-/// All sixteen harmonics.
-const VECTORS: usize = GIB_LEARNING_HARMONICS / 4;
 
 impl Learning {
     /// Points of the revolution; none before the first start or `install`.
@@ -56,7 +54,7 @@ impl Learning {
         let points = self.plan.points;
         let mut sums = Harmonics::default();
         for (i, cell) in self.tables[self.front & 1].iter().enumerate().take(points) {
-            sums.gather(&Wheel::at(angle(i, points), VECTORS), VECTORS, cell.value);
+            sums.gather(&Wheel::at(angle(i, points), PAIRS), PAIRS, cell.value);
         }
         let scale = 2.0 / self.plan.scale;
         for (i, line) in self.lines.iter_mut().enumerate() {

@@ -1,0 +1,168 @@
+//! From the harmonics of the accelerations to those of the displacements: divided by −ω², calibrated, and less what noise
+//! explains. A slice of a pair of harmonics a cycle, so that every cycle costs about the same.
+
+use super::*;
+use crate::cycle::lanes::{Lanes, flushed, swapped};
+use crate::cycle::vibration::harmonic::FLUSH;
+use wide::f64x2;
+
+/// Drift of an amplitude in a revolution per relative change of speed in it, beside what inertia forces do: a middle between a
+/// machine without resonances, 0, and one at a resonance of 4 % damping, 12.
+const SWING: f32 = 2.5;
+
+/// Relative change of speed up to which factors hold.
+const FACTORS_HOLD: f64 = 1e-3;
+
+/// Factors of a pair at a speed. Lanes: x and y of one harmonic, x and y of the other.
+#[derive(Debug, Clone, Copy, Default)]
+struct Factors {
+    /// Turns per cycle that they hold for.
+    rate: f64,
+    /// Displacement over acceleration of seat and bearing, a complex number: µm per m/s².
+    re: [Lanes; 2],
+    im: [Lanes; 2],
+    /// Mean square displacement per variance of the acceleration.
+    noise: Lanes,
+    /// 1 for a harmonic that is tracked at this speed, else 0; and for one whose displacement counts.
+    kept: Lanes,
+    used: Lanes,
+}
+
+/// What renewal keeps. Which pair is due follows from the count of cycles alone, so that nothing of the past stays in it.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Renewal {
+    /// Cycles since the start.
+    count: u32,
+    factors: [Factors; PAIRS],
+    /// Progress at which each pair of either sensor was looked at last; and at which any was.
+    seen: [[f64; PAIRS]; 2],
+    last: f64,
+}
+
+impl Vibration {
+    /// A whole pair.
+    pub(super) fn renew_pair(&mut self) {
+        self.renewal.count = self.renewal.count.wrapping_add(1);
+        let pair = self.renewal.count as usize & (self.plan.pairs.wrapping_sub(1) & (PAIRS - 1));
+        if self.stale(pair) {
+            self.find_factors(pair);
+        }
+        self.look_at(GIB_VIBRATION_SEAT, pair);
+        self.believe::<false>(GIB_VIBRATION_SEAT, pair);
+        self.look_at(GIB_VIBRATION_BEARING, pair);
+        self.believe::<false>(GIB_VIBRATION_BEARING, pair);
+        self.keep_average();
+    }
+
+    /// One cycle of four looks whether the sensors live, and renews a slice of a pair: at a steady speed displacements change
+    /// slowly.
+    #[inline(always)]
+    pub(super) fn renew_slice<const N: usize>(&mut self, readings: f64x2) {
+        let count = self.renewal.count.wrapping_add(1);
+        self.renewal.count = count;
+        if count & 3 != 0 {
+            return;
+        }
+        if self.sensors.repeats(readings) {
+            self.usual = 0;
+        }
+        let pair = (count >> 4) as usize & (N - 1);
+        match count >> 2 & 3 {
+            0 => self.look_at(GIB_VIBRATION_SEAT, pair),
+            1 => self.believe::<true>(GIB_VIBRATION_SEAT, pair),
+            2 => self.look_at(GIB_VIBRATION_BEARING, pair),
+            _ => {
+                self.believe::<true>(GIB_VIBRATION_BEARING, pair);
+                self.keep_average();
+                if self.stale(pair) {
+                    self.usual = 0;
+                }
+            }
+        }
+    }
+
+    /// Averages and floors that no single pair has.
+    #[inline(always)]
+    fn keep_average(&mut self) {
+        let now = &mut self.renewal;
+        // First in a hurry, then by the average over the revolutions asked for.
+        let hurry = 2.0 / self.progress as f32;
+        self.part = if hurry > self.plan.share_min { hurry } else { self.plan.share_min };
+        // Averaged over a revolution.
+        let turned = self.progress - now.last;
+        now.last = self.progress;
+        let part = if turned > 0.0 && turned < 1.0 { turned } else { 1.0 };
+        self.swing = (self.swing - self.swing * part + 1e-12) - 1e-12;
+        self.trackers.keep_floor();
+    }
+
+    /// Whether the factors of a pair are those of another speed.
+    #[inline(always)]
+    fn stale(&self, pair: usize) -> bool {
+        let stand = self.spindle.stand();
+        (self.renewal.factors[pair].rate - stand).abs() > FACTORS_HOLD * stand.abs()
+    }
+
+    /// Factors of a pair at the present speed.
+    #[inline(always)]
+    fn find_factors(&mut self, pair: usize) {
+        let (plan, stand) = (&self.plan, self.spindle.stand());
+        let turning = stand.abs();
+        let first = 2 * pair as i32 + 1;
+        let number = Lanes::new([first as f32, first as f32, (first + 1) as f32, (first + 1) as f32]);
+        let rate = number * Lanes::splat(turning as f32);
+        // Where the spindle does not turn nothing counts, which the caller sees to.
+        let slow = rate.simd_lt(Lanes::splat(plan.tracked[0]));
+        let fast = rate.simd_ge(Lanes::splat(plan.tracked[1])) | number.simd_gt(Lanes::splat(plan.harmonics as f32));
+        let left_out = slow | fast;
+        let to_um = left_out.bitselect(Lanes::ZERO, Lanes::splat(plan.to_um) / (rate * rate));
+        let [a, b, c, d] = plan.gain(f64::from(first) * turning).to_array();
+        let [e, f, g, h] = plan.gain(f64::from(first + 1) * turning).to_array();
+        let sense = Lanes::splat(if stand < 0.0 { -1.0 } else { 1.0 }) * to_um;
+        self.renewal.factors[pair] = Factors {
+            rate: stand,
+            re: [Lanes::new([a, a, e, e]) * to_um, Lanes::new([c, c, g, g]) * to_um],
+            im: [Lanes::new([b, -b, f, -f]) * sense, Lanes::new([d, -d, h, -h]) * sense],
+            noise: Lanes::splat(2.0 * turning as f32) * to_um * to_um,
+            kept: (fast & !slow).bitselect(Lanes::ZERO, Lanes::ONE),
+            used: left_out.bitselect(Lanes::ZERO, Lanes::ONE),
+        };
+    }
+
+    /// Displacements of a pair of one sensor, with their averages.
+    #[inline(always)]
+    fn look_at(&mut self, n: usize, pair: usize) {
+        let now = &self.renewal.factors[pair];
+        let (re, im, kept, used) = (now.re[n], now.im[n], now.kept, now.used);
+        let tracked = &mut self.trackers.harmonics[n].0[pair];
+        *tracked = flushed(*tracked, FLUSH) * kept;
+        let mut way = re * *tracked + im * swapped(*tracked);
+        if n == GIB_VIBRATION_SEAT && self.plan.second_slide {
+            let slide = &mut self.slide.harmonics[0].0[pair];
+            *slide = flushed(*slide, FLUSH) * kept;
+            way -= *slide * used;
+        }
+        let share = self.trackers.shares[n][pair];
+        let seen = &mut self.renewal.seen[n][pair];
+        let turned = (self.progress - *seen) as f32;
+        *seen = self.progress;
+        // Less than none has turned where all has begun anew.
+        let news = share * Lanes::splat(if turned > 0.0 { turned } else { 1.0 }) * used;
+        self.known[n][pair].look(way, news, share - Lanes::splat(self.part));
+    }
+
+    /// How much of them is believed, and how fast they are followed from now on. Shown at once, or half at a time, so that
+    /// the correction does not jump while they change fast.
+    #[inline(always)]
+    fn believe<const AT_ONCE: bool>(&mut self, n: usize, pair: usize) {
+        let now = &self.renewal.factors[pair];
+        let (noise, used) = (now.noise, now.used);
+        let variance = self.trackers.variance()[n];
+        let (share, known) = (&mut self.trackers.shares[n][pair], &mut self.known[n][pair]);
+        let noise = noise * Lanes::splat(variance);
+        let (now, shown) = (known.believed(noise * *share) * used, &mut self.displacement[n].0[pair]);
+        *shown = if AT_ONCE { now } else { flushed(Lanes::splat(0.5) * (*shown + now), FLUSH) };
+        let drift = SWING * self.swing.abs() as f32;
+        *share += (known.share(drift, noise, self.part) - *share) * used;
+    }
+}
