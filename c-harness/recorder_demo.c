@@ -3,7 +3,8 @@
  *
  *   recorder_demo GIB FILE.csv [SECONDS]
  *
- * Prints rows, lost rows, the cost of a step, and what an hour would make. Without arguments it says what it needs.
+ * Prints rows, lost rows, the cost of a step, and what an hour would make. Beyond five minutes the reader begins a new file
+ * each minute and keeps the newest two, FILE-0001.csv and so on. Without arguments it says what it needs.
  */
 #include "gib.h"
 
@@ -20,6 +21,7 @@
 
 #define CHANNELS 24u
 #define RATE_HZ 32000
+#define LONG_S 300.0
 
 static double now_s(clockid_t clock)
 {
@@ -72,7 +74,12 @@ int main(int argc, char **argv)
     unlink(argv[2]);
     pid_t reader = fork();
     if (reader == 0) {
-        execlp(argv[1], "gib", "record", name, "--history", "--out", argv[2], "--for", length, (char *)NULL);
+        char *command[] = {"gib",   "record", name, "--history", "--out", argv[2], "--for",
+                           length, "--rotate", "60", "--keep",    "2",     NULL};
+        if (seconds <= LONG_S) {
+            command[8] = NULL;
+        }
+        execvp(argv[1], command);
         _exit(127);
     }
     /* A millisecond's rows at a time; late ones are caught up. */
@@ -111,7 +118,9 @@ int main(int argc, char **argv)
            1e-6 * (double)report.bytes, report.locked ? "yes" : "no");
     printf("a step takes %.0f ns, %.2f %% of a core at this rate; the reader takes %.0f %% of a core\n",
            1e9 * in_steps / (double)rows, 100.0 * in_steps * RATE_HZ / (double)rows, 100.0 * cpu / seconds);
-    printf("the file grows by %.1f MB/s: %.0f GB in an hour\n", 1e-6 * (double)meta.st_size / seconds,
-           3.6e-6 * (double)meta.st_size / seconds);
+    if (seconds <= LONG_S) {
+        printf("the file grows by %.1f MB/s: %.0f GB in an hour\n", 1e-6 * (double)meta.st_size / seconds,
+               3.6e-6 * (double)meta.st_size / seconds);
+    }
     return status;
 }
