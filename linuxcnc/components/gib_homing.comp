@@ -53,6 +53,8 @@ variable double drive_safe = 0.0;
 variable double cmd_safe = 0.0;
 variable int owned = 0;
 variable int fault = 0;
+variable int stop = 0; /* gib wants the torque off the motor */
+variable int awake = 0; /* homing goes on, or did in the last cycle */
 
 option extra_setup yes;
 option extra_cleanup yes;
@@ -99,32 +101,11 @@ static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
     return gib_homing_start(gib, &config);
 }
 
-/* The usual cycle: nobody homes, positions pass through. */
-static int quiet(struct __comp_state *__comp_inst)
-{
-    if (busy || index_enable || owned) {
-        return 0;
-    }
-    drive_cmd = cmd_safe - offset;
-    position_fb = drive_safe + offset;
-    torque_limit_cmd = out.request_id ? out.torque_limit : torque_limit_normal;
-    ok = ok_in && !fault && !out.stop_drive;
-    return 1;
-}
-
-FUNCTION(_)
+/* A cycle of homing, or of what follows it. Apart, so that the usual one costs little. */
+__attribute__((noinline, cold)) static void work(struct __comp_state *__comp_inst, long period)
 {
     gib_homing_report report;
     int32_t status;
-
-    /* What is no number goes nowhere: the last safe value stays, and motion is told. */
-    if (!enable) {
-        fault = 0;
-    }
-    fault = gib_hal_held(drive_fb, &drive_safe) && gib_hal_held(position_cmd, &cmd_safe) ? fault : GIB_ERR_NON_FINITE;
-    if (quiet(__comp_inst)) {
-        return;
-    }
     if (index_enable && enable && !busy && !fault) {
         status = begin(__comp_inst, period * 1e-9);
         fault = status < 0 ? status : 0;
@@ -153,7 +134,6 @@ FUNCTION(_)
         drive_cmd = cmd_safe - offset;
         position_fb = drive_safe + offset;
     }
-    torque_limit_cmd = out.request_id ? out.torque_limit : torque_limit_normal;
     if (busy && status != GIB_BUSY) {
         busy = 0;
         index_enable = 0;
@@ -164,5 +144,23 @@ FUNCTION(_)
         contact_spread = report.side[0].spread_um;
     }
     state = out.phase;
-    ok = ok_in && !fault && !out.stop_drive;
+    stop = out.stop_drive;
+    awake = busy || owned || index_enable;
+}
+
+FUNCTION(_)
+{
+    if (!enable) {
+        fault = stop = 0;
+    }
+    /* What is no number goes nowhere: the last safe value stays, and motion is told. */
+    fault = gib_hal_held(drive_fb, &drive_safe) && gib_hal_held(position_cmd, &cmd_safe) ? fault : GIB_ERR_NON_FINITE;
+    if (awake | index_enable) {
+        work(__comp_inst, period);
+    } else {
+        drive_cmd = cmd_safe - offset;
+        position_fb = drive_safe + offset;
+    }
+    torque_limit_cmd = out.request_id ? out.torque_limit : torque_limit_normal;
+    ok = ok_in && !(fault | stop);
 }

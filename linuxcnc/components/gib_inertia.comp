@@ -12,6 +12,7 @@ period \\fBswing-time\\fR, or as far as power and torque allow at that inertia. 
 A parameter left at 0 takes the default of gib_inertia_config or gib_speed_variation_config in gib.h.
 """;
 include "gib.h";
+include "gib_hal.h";
 
 pin in float speed_cmd "from spindle.N.speed-out, rpm, signed";
 pin out float drive_speed_cmd "speed that the drive shall follow, rpm, signed";
@@ -57,7 +58,7 @@ variable int running = 0;
 variable int measured = 0;
 variable int started = 0;
 variable int fault = 0;
-variable double command = 0.0;
+variable double speed_safe = 0.0;
 
 option extra_setup yes;
 option extra_cleanup yes;
@@ -121,13 +122,10 @@ static int32_t begin_to_vary(struct __comp_state *__comp_inst, double cycle_s)
 }
 
 /* One cycle of the measurement; whether it has the spindle. */
-static int measuring(struct __comp_state *__comp_inst, double cycle_s)
+__attribute__((noinline, cold)) static int measuring(struct __comp_state *__comp_inst, double cycle_s)
 {
     gib_inertia_report report;
     int32_t status;
-    if (!measure && !measured && !running) {
-        return 0;
-    }
     if (measure && !measured && enable && !fault && speed_cmd == 0.0 && !running) {
         error = begin(__comp_inst, cycle_s);
         done = 0;
@@ -160,57 +158,59 @@ static int measuring(struct __comp_state *__comp_inst, double cycle_s)
     return running && out.owns_motion;
 }
 
-/* One cycle of the variation: the speed to be commanded. */
-static double varied(struct __comp_state *__comp_inst, double cycle_s)
+/* Begins to vary, once the spindle is at speed and all that is needed is known. */
+__attribute__((noinline, cold)) static void wait_to_vary(struct __comp_state *__comp_inst, double cycle_s)
 {
-    double wanted = speed_cmd;
-    int at_speed = fabs(wanted) > 1.0 && fabs(drive_speed - wanted) < 0.05 * fabs(wanted);
-    int may = vary && enable && !fault && ina > 0.0;
-    int32_t status;
-    if (!varying && may && at_speed && !started) {
+    int at_speed = fabs(speed_cmd) > 1.0 && fabs(drive_speed - speed_cmd) < 0.05 * fabs(speed_cmd);
+    if (!(ina > 0.0)) {
+        vary_message = GIB_ERR_PROGRAM_ABSENT;
+    } else if (at_speed && enable && !fault && !started) {
         vary_message = begin_to_vary(__comp_inst, cycle_s);
         varying = vary_message == GIB_OK;
         started = 1;
-    } else if (vary && !(ina > 0.0)) {
-        vary_message = GIB_ERR_PROGRAM_ABSENT;
     }
-    started = started && vary && wanted != 0.0;
+}
+
+/* One cycle of the variation: the speed to be commanded. A stop is a stop, whatever is still to be wound down. */
+static double varied(struct __comp_state *__comp_inst, double wanted)
+{
+    int go_on = vary && enable && !fault && wanted != 0.0 && ina > 0.0;
     gib_speed_variation_input in = {
         .speed_rpm = wanted,
         .amplitude_ratio = amplitude,
         .period_s = swing_time,
-        .flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (may && wanted != 0.0 ? 0 : GIB_SPEED_VARIATION_STOP),
+        .flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (go_on ? 0 : GIB_SPEED_VARIATION_STOP),
     };
-    status = gib_speed_variation_step(variation, &in, &swing);
-    if (varying) {
-        varying = status == GIB_BUSY;
-        vary_message = swing.message;
-    }
+    varying = gib_speed_variation_step(variation, &in, &swing) == GIB_BUSY;
+    vary_message = swing.message;
+    amplitude_most = swing.amplitude_limit_ratio;
     torque_ff = varying ? swing.torque_nm : 0.0;
     amplitude_now = varying ? swing.amplitude_ratio : 0.0;
-    amplitude_most = swing.amplitude_limit_ratio;
-    /* A stop is a stop, whatever is still to be wound down. */
     return varying && wanted != 0.0 ? swing.speed_command_rpm : wanted;
 }
 
 FUNCTION(_)
 {
-    double cycle_s = period * 1e-9, wanted;
+    double wanted;
     if (!enable) {
         fault = 0;
     }
-    if (!isfinite(drive_speed) || !isfinite(speed_cmd)) {
+    /* What is no number goes nowhere: the last safe value stays, and motion is told. */
+    if (!gib_hal_held(speed_cmd, &speed_safe) || !isfinite(drive_speed)) {
         fault = GIB_ERR_NON_FINITE;
     }
-    if (measuring(__comp_inst, cycle_s)) {
+    wanted = speed_safe;
+    started = started && vary && wanted != 0.0;
+    if ((measure | measured | running) && measuring(__comp_inst, period * 1e-9)) {
         wanted = out.speed_command_rpm;
     } else {
-        wanted = varied(__comp_inst, cycle_s);
+        if (vary && !varying) {
+            wait_to_vary(__comp_inst, period * 1e-9);
+        }
+        if (varying) {
+            wanted = varied(__comp_inst, wanted);
+        }
     }
-    /* What is no number goes nowhere: the last safe value stays, and motion is told. */
-    if (isfinite(wanted)) {
-        command = wanted;
-    }
-    drive_speed_cmd = enable ? command : 0.0;
+    drive_speed_cmd = enable ? wanted : 0.0;
     ok = ok_in && !fault;
 }
