@@ -33,7 +33,7 @@ fn what_is_hidden_is_there_and_the_files_are_valid() {
     kinds.extend([Kind::Nothing, Kind::Two, Kind::Outside(random.pick(&outside::NAMES))]);
     let folder = tempfile::tempdir().unwrap();
     for (index, kind) in kinds.into_iter().enumerate() {
-        let case = Case::draw(seed, index, kind, 11.0);
+        let case = Case::draw(seed, index, kind, 11.0, false);
         let about = format!("seed {seed}, case {index}, {kind:?}");
         if kind == Kind::Nothing {
             assert!(case.difference < LEAST, "{about}: clean differs by {}", case.difference);
@@ -54,7 +54,7 @@ fn what_is_hidden_is_there_and_the_files_are_valid() {
 
 #[test]
 fn a_seed_gives_the_same_case_again() {
-    let draw = || Case::draw(12, 3, Kind::One("cogging"), 11.0);
+    let draw = || Case::draw(12, 3, Kind::One("cogging"), 11.0, false);
     let (a, b) = (draw(), draw());
     assert_eq!((&a.recording.torque, &a.holdout.position), (&b.recording.torque, &b.holdout.position));
     assert_ne!(a.recording.torque, a.holdout.torque);
@@ -116,7 +116,7 @@ fn the_servo_and_machine_are_those_of_the_sample_recording() {
 fn diagnosed(seed: u64, kinds: &[Kind], longest: f64) -> Vec<Score> {
     let folder = tempfile::tempdir().unwrap();
     let one = |index: usize| {
-        let case = Case::draw(seed, index, kinds[index], longest);
+        let case = Case::draw(seed, index, kinds[index], longest, false);
         let folder = folder.path().join(index.to_string());
         let files = case.write(&folder).unwrap();
         let score = score::diagnose(std::path::Path::new(env!("CARGO_BIN_EXE_gib")), &case, &files, &folder);

@@ -1,12 +1,15 @@
 //! What the belief already explains is taken off the recording before anything is looked for, and what is found joins it.
 //!
-//! Base values of the belief (inertia, friction, constant torque) are regressors of the balance; its other effects are
-//! predicted by the simulation itself, T(belief) − T(base alone), so that a machine file explains in a diagnosis just what
-//! it explains in `gib predict`.
+//! Base values of the belief (inertia, friction, constant torque) are regressors of the balance. Clearance and spring are
+//! simulated as they are when they are looked for, so that what was found leaves nothing when it is believed. The other
+//! effects are predicted, T(belief) − T(base alone), so that a machine file explains in a diagnosis just what it explains
+//! in `gib predict`.
 
-use super::frame::Columns;
+use super::causes::{Trace, table_side};
+use super::frame::{Columns, Frame};
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::predict::predict_torque;
+use std::f64::consts::TAU;
 
 /// Whether an effect of the belief is one of its base values or its timing, which the balance itself takes care of.
 fn in_the_balance(effect: &Effect) -> bool {
@@ -20,6 +23,10 @@ fn in_the_balance(effect: &Effect) -> bool {
     )
 }
 
+fn sets_the_table_apart(effect: &Effect) -> bool {
+    matches!(effect.cause(), Cause::Backlash | Cause::DriveCompliance)
+}
+
 /// The axis with its belief as base values and nothing else but the timing.
 #[must_use]
 pub fn base_alone(axis: &Axis) -> Axis {
@@ -27,28 +34,41 @@ pub fn base_alone(axis: &Axis) -> Axis {
     Axis { base: axis.belief(), ..axis.with_effects(timing) }
 }
 
-/// Takes off the columns what the effects of the belief add to its base values.
+/// Takes off the columns what the effects of the belief add to its base values on a rigid axis; the rest is in [`trace`].
 ///
 /// # Errors
 /// The effects contradict the inertia, as [`Axis::two_masses`].
 pub fn take_off(axis: &Axis, columns: &mut Columns) -> Result<(), String> {
-    if axis.effects.iter().all(in_the_balance) {
+    axis.two_masses()?;
+    let rigid: Vec<Effect> = axis.effects.iter().copied().filter(|e| !sets_the_table_apart(e)).collect();
+    if rigid.iter().all(in_the_balance) {
         return Ok(());
     }
     let Some(observed) = columns.observed() else { return Ok(()) };
-    let (all, base) = (predict_torque(axis, &observed)?, predict_torque(&base_alone(axis), &observed)?);
+    let all = predict_torque(&axis.with_effects(rigid), &observed)?;
+    let base = predict_torque(&base_alone(axis), &observed)?;
     for ((measured, all), base) in columns.torque.iter_mut().zip(&all.torque).zip(&base.torque) {
         let known = all - base;
         *measured -= if known.is_finite() { known } else { 0.0 };
     }
     if let Some(table) = &mut columns.table {
-        for (i, (table, x)) in table.iter_mut().zip(&columns.position).enumerate() {
-            let lag = all.table_lag.as_ref().map_or(0.0, |lag| lag[i]);
-            let known = all.physics.table_of(*x) - x - all.physics.table_zero + lag;
+        for (table, x) in table.iter_mut().zip(&columns.position) {
+            let known = all.physics.table_of(*x) - x - all.physics.table_zero;
             *table -= if known.is_finite() { known } else { 0.0 };
         }
     }
     Ok(())
+}
+
+/// What the belief expects at the judged rows: its base torque, and what clearance and spring add to it.
+#[must_use]
+pub fn trace(axis: &Axis, frame: &Frame) -> Trace {
+    let mut sum = Trace::torque(frame.believed());
+    if let Some(apart) = table_side::believed(frame, axis) {
+        sum.torque.iter_mut().zip(&apart.torque).for_each(|(sum, torque)| *sum += torque);
+        sum.table = apart.table;
+    }
+    sum
 }
 
 /// Whether a cause can be found beside what the belief has of it: it may be there more than once, replaces the believed
@@ -81,6 +101,43 @@ pub fn together(axis: &Axis, found: Effect) -> Effect {
             CableForce { slope: slope + more, zero_mm: (slope * zero_mm + more * zero) / (slope + more) }
         }
         _ => found,
+    }
+}
+
+/// What was found between motor and table together with another inertia, in the words of the axis that has this inertia: it
+/// was simulated with the table's share of the believed one, and what inertia was found beside it is the motor's.
+pub fn reconcile<'e>(axis: &Axis, found: impl Iterator<Item = &'e mut Effect>) {
+    let mut found: Vec<&mut Effect> = found.collect();
+    let inertia = found.iter().find_map(|e| match **e {
+        Effect::InertiaMismatch { inertia } => Some(inertia),
+        _ => None,
+    });
+    if let Some(inertia) = inertia {
+        found.iter_mut().for_each(|e| **e = on_inertia(axis, **e, inertia));
+    }
+}
+
+fn on_inertia(axis: &Axis, effect: Effect, inertia: f64) -> Effect {
+    let Ok(Some(m)) = axis.with_effects(vec![effect]).two_masses() else { return effect };
+    let motor = inertia - m.table_inertia;
+    if !(motor > 0.0) {
+        return effect;
+    }
+    let omega = (m.stiffness * (1.0 / motor + 1.0 / m.table_inertia)).sqrt();
+    match effect {
+        Effect::DriveCompliance { stiffness_n_um, table_friction_share, .. } => Effect::DriveCompliance {
+            resonance_hz: omega / TAU,
+            stiffness_n_um,
+            table_friction_share,
+            damping_ratio: 0.5 * m.damping * omega / m.stiffness,
+        },
+        Effect::Backlash { width_um, table_friction_share, .. } => Effect::Backlash {
+            width_um,
+            table_inertia_share: m.table_inertia / inertia,
+            table_friction_share,
+            contact_hz: omega / TAU,
+        },
+        other => other,
     }
 }
 
@@ -121,6 +178,28 @@ mod tests {
         assert_eq!(found[3], Effect::DeadTime { delay_ms: 1.0 });
         let extended = extended(&axis, &found);
         assert_eq!((extended.effects.len(), extended.belief().inertia), (5, 0.005));
+    }
+
+    #[test]
+    fn an_elastic_drive_keeps_its_spring_and_table_when_the_motor_is_heavier() {
+        let axis = Axis { effects: Vec::new(), ..axis() };
+        let masses = |axis: &Axis, effects: Vec<Effect>| axis.with_effects(effects).two_masses().unwrap().unwrap();
+        let spring = Effect::DriveCompliance {
+            resonance_hz: 60.0,
+            stiffness_n_um: 30.0,
+            table_friction_share: 0.7,
+            damping_ratio: 0.05,
+        };
+        let (before, heavier) = (masses(&axis, vec![spring]), Effect::InertiaMismatch { inertia: 0.004 });
+        let after = masses(&axis, vec![heavier, on_inertia(&axis, spring, 0.004)]);
+        for (a, b) in [
+            (before.stiffness, after.stiffness),
+            (before.table_inertia, after.table_inertia),
+            (before.damping, after.damping),
+            (before.motor_inertia + 0.001, after.motor_inertia),
+        ] {
+            assert!((a / b - 1.0).abs() < 1e-9, "{before:?} {after:?}");
+        }
     }
 
     #[test]

@@ -64,17 +64,13 @@ fn mean(values: &mut [f64], width: usize, scratch: &mut Vec<f64>) {
     }
 }
 
-/// Weights of [`simpson`].
-pub const SIMPSON: [f64; 3] = [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0];
-
-/// The mean over one row to either side of the straight lines between rows: (1, 4, 1)/6. A central difference of positions
-/// is just this mean of the speed, and a second difference the triangular one of the acceleration.
+/// A weighted mean of three rows inside each stretch; its end rows stay as they are.
 #[must_use]
-pub fn simpson(values: &[f64], stretches: &[Range<usize>]) -> Vec<f64> {
+pub fn of_three(values: &[f64], weights: [f64; 3], stretches: &[Range<usize>]) -> Vec<f64> {
     let mut out = values.to_vec();
     for stretch in stretches {
         for i in stretch.start + 1..stretch.end.saturating_sub(1) {
-            out[i] = (values[i - 1] + 4.0 * values[i] + values[i + 1]) / 6.0;
+            out[i] = weights[0] * values[i - 1] + weights[1] * values[i] + weights[2] * values[i + 1];
         }
     }
     out

@@ -10,6 +10,9 @@ use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 use std::sync::Arc;
 
+/// How much larger than at a start the trace of a cause without coefficients is taken to become.
+const MOST_SIZE: f64 = 2.0;
+
 /// A recording as one system of equations.
 #[derive(Debug)]
 pub struct Bench<'f, 'a> {
@@ -37,6 +40,14 @@ pub struct Part {
     columns: Arc<[Vec<f64>]>,
 }
 
+impl Part {
+    /// Whether its size is a fitted coefficient.
+    #[must_use]
+    pub fn has_coefficients(&self) -> bool {
+        !self.columns.is_empty()
+    }
+}
+
 /// A fitted set of causes.
 #[derive(Debug, Clone)]
 pub struct Fit {
@@ -51,11 +62,12 @@ pub struct Fit {
 }
 
 impl<'f, 'a> Bench<'f, 'a> {
-    /// Sets up the equations; `base` is the torque of everything believed, at the judged rows.
+    /// Sets up the equations; `base` is what everything believed makes at the judged rows.
     #[must_use]
-    pub fn new(frame: &'f Frame<'a>, base: &[f64]) -> Self {
-        let torque: Vec<f64> = frame.torque(0.0).iter().zip(base).map(|(t, b)| t - b).collect();
-        let table = frame.table_error();
+    pub fn new(frame: &'f Frame<'a>, base: &Trace) -> Self {
+        let torque: Vec<f64> = frame.torque(0.0).iter().zip(&base.torque).map(|(t, b)| t - b).collect();
+        let mut table = frame.table_error();
+        table.iter_mut().zip(&base.table).for_each(|(t, b)| *t -= b);
         let rows = torque.len();
         let floors = [frame.floor(&torque, true), if table.is_empty() { 1.0 } else { frame.floor(&table, false) }];
         let measured: Vec<f64> = torque
@@ -157,7 +169,10 @@ impl<'f, 'a> Bench<'f, 'a> {
         };
         if let Some(fixed) = &part.fixed {
             let fixed = clear(fixed, &[]);
-            residual.iter_mut().zip(fixed).for_each(|(r, f)| *r -= f);
+            // A start is not yet as large as it will be: without coefficients its trace counts by its form.
+            let along = dot(&fixed, &residual) / dot(&fixed, &fixed).max(1e-300);
+            let size = if part.columns.is_empty() { along.clamp(0.0, MOST_SIZE) } else { 1.0 };
+            residual.iter_mut().zip(fixed).for_each(|(r, f)| *r -= size * f);
         }
         for column in part.columns.iter() {
             let mut c = clear(column, &own);

@@ -4,16 +4,14 @@
 //! nothing; rows whose filter touches a rest that the encoder cannot resolve are left out. Everything is in the motor's
 //! coordinate and the drive's own unit (N·m, rad; N, m), positions in load units (mm; degree).
 //!
-//! Timing: how late the torque column is by the servo's sampling alone is known from the machine file
-//! ([`sampling_shift_s`]) and taken off before any dead time is looked for.
+//! Timing: how late the torque column is by the servo's sampling alone is known from the machine file ([`Sampling`]) and
+//! taken off before any dead time is looked for.
 
-use super::filter::{LowPass, SIMPSON, convolve, norm, simpson};
+use super::filter::{LowPass, convolve, norm, of_three};
 use super::fit::dot;
+use super::sampling::{NUMEROV, Sampling};
 use crate::machine::{Axis, Belief, Effect};
-use crate::plant::motion::Motion;
-use crate::plant::predict::sampling_shift_s;
 use std::ops::Range;
-use std::sync::OnceLock;
 
 /// Plain columns of one axis: what a diagnosis needs of a recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,6 +60,10 @@ pub struct Frame<'a> {
     pub x: Vec<f64>,
     /// Smoothed speed, load units/s.
     pub v: Vec<f64>,
+    /// Smoothed acceleration, load units/s².
+    pub a: Vec<f64>,
+    /// Speed as the encoder shows it, by central differences, load units/s.
+    pub raw_speed: Vec<f64>,
     /// Direction of sliding, mean over the row: −1 to 1.
     pub direction: Vec<f64>,
     /// The encoder's grid, load units.
@@ -80,10 +82,11 @@ pub struct Frame<'a> {
     pub speed: Vec<f64>,
     /// Filtered torque of every row, not aligned.
     torque: Vec<f64>,
-    motion: OnceLock<Option<Motion>>,
-    /// Weights of the whole filter of the torque balance, and of that of table − encoder; odd.
+    stroke: (f64, f64),
+    /// Weights of the whole filter of what is smooth between rows, of the measured torque, and of the low-pass alone; odd.
     kernel: Vec<f64>,
-    table_kernel: Vec<f64>,
+    torque_kernel: Vec<f64>,
+    low_pass_kernel: Vec<f64>,
 }
 
 impl<'a> Frame<'a> {
@@ -109,13 +112,22 @@ impl<'a> Frame<'a> {
         let resolution = grid.max(3.0 * scatter).max(1e-12);
         let resting = resting_rows(columns, resolution);
         let direction = direction_of(columns, &v, &a, resolution);
-        let torque = low_pass.run(&simpson(&columns.torque, stretches), stretches);
-        let table_kernel = low_pass.kernel();
-        let kernel = convolve(&table_kernel, &SIMPSON);
+        let sampling = Sampling::of(axis, columns);
+        let torque = low_pass.run(&of_three(&columns.torque, sampling.weights, stretches), stretches);
+        let low_pass_kernel = low_pass.kernel();
+        let kernel = convolve(&low_pass_kernel, &NUMEROV);
+        let torque_kernel = convolve(&low_pass_kernel, &sampling.weights);
         let doubt = low_pass.run(&doubtful_rows(columns, resting, resolution), stretches);
         let level = belief.coulomb.max(1e-3 * typical(&columns.torque)) / torque_noise.max(1e-300);
-        let kernel_norm = norm(&table_kernel);
-        let weight_of = |row: usize| 1.0 / (1.0 + (level * doubt[row] / kernel_norm).powi(2)).sqrt();
+        let kernel_norm = norm(&low_pass_kernel);
+        // What torque and acceleration do between rows is not known: a straight line is off by a twelfth of the second
+        // difference. Flanks that meet are nothing but that.
+        let sharp = 1.0 / (12.0 * (torque_noise * kernel_norm).max(1e-300));
+        let bends = [beyond_noise(&torque), beyond_noise(&a)];
+        let weight_of = |row: usize| {
+            let open = sharp * bends[0][row].hypot(belief.inertia * unit * bends[1][row]);
+            (1.0 + (level * doubt[row] / kernel_norm).powi(2) + open.powi(2)).sqrt().recip()
+        };
         // Room for the filter and for reading between rows.
         let margin = low_pass.reach() + 5;
         let kept = judged_rows(columns, margin, low_pass.width / 2 + 1, |row| weight_of(row) > LEAST_WEIGHT);
@@ -133,27 +145,22 @@ impl<'a> Frame<'a> {
             low_pass,
             x,
             v,
+            a,
+            raw_speed: central,
             direction,
             grid,
-            known_delay_s: sampling_shift_s(axis, columns.recorded_period_s) + believed_delay(axis),
+            known_delay_s: sampling.shift_s + believed_delay(axis),
             kept,
             weights,
             blocks,
             acceleration,
             speed,
             torque,
-            motion: OnceLock::new(),
+            stroke: columns.position.iter().fold((f64::MAX, f64::MIN), |(lo, hi), x| (x.min(lo), x.max(hi))),
             kernel,
-            table_kernel,
+            torque_kernel,
+            low_pass_kernel,
         }
-    }
-
-    /// The motion as a prediction sees it, up to where it meets the encoder's noise: sharper than [`Frame::x`], for what
-    /// happens between two rows. `None` where no stretch is long enough.
-    #[must_use]
-    pub fn motion(&self) -> Option<&Motion> {
-        let of = || Motion::of_stretches(&self.columns.time_s, &self.columns.position, &self.columns.stretches);
-        self.motion.get_or_init(of).as_ref()
     }
 
     /// A regressor of every row, filtered like the torque, at the judged rows.
@@ -162,10 +169,11 @@ impl<'a> Frame<'a> {
         self.weighed(values, &self.kernel, 0)
     }
 
-    /// A column of table − encoder, filtered, at the judged rows.
+    /// A column of table − encoder, or of means that are already triangular ones over a row to either side, filtered, at the
+    /// judged rows.
     #[must_use]
-    pub fn judged_table(&self, values: &[f64]) -> Vec<f64> {
-        self.weighed(values, &self.table_kernel, 0)
+    pub fn low_passed(&self, values: &[f64]) -> Vec<f64> {
+        self.weighed(values, &self.low_pass_kernel, 0)
     }
 
     /// Weighted sum of the rows about each judged row, `offset` rows later. The rows that are not judged are not worked out.
@@ -183,7 +191,7 @@ impl<'a> Frame<'a> {
     pub fn table_error(&self) -> Vec<f64> {
         self.columns.table.as_ref().map_or_else(Vec::new, |table| {
             let error: Vec<f64> = table.iter().zip(&self.columns.position).map(|(t, x)| t - x).collect();
-            self.judged_table(&error)
+            self.low_passed(&error)
         })
     }
 
@@ -196,7 +204,7 @@ impl<'a> Frame<'a> {
         let unit =
             |k: usize| cubic_at(&[0.0, 1.0, 2.0, 3.0].map(|i| f64::from(u8::from(i == k as f64))), 1.0 + between);
         let weights = [unit(0), unit(1), unit(2), unit(3)];
-        let kernel = convolve(&self.kernel, &[0.0, weights[0], weights[1], weights[2], weights[3]]);
+        let kernel = convolve(&self.torque_kernel, &[0.0, weights[0], weights[1], weights[2], weights[3]]);
         self.weighed(values, &kernel, rows as isize)
     }
 
@@ -219,7 +227,7 @@ impl<'a> Frame<'a> {
     #[must_use]
     pub fn floor(&self, values: &[f64], averaged: bool) -> f64 {
         let stride = self.kept.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(1);
-        let kernel = if averaged { &self.kernel } else { &self.table_kernel };
+        let kernel = if averaged { &self.torque_kernel } else { &self.low_pass_kernel };
         let correlation = |lag: usize| {
             kernel.iter().zip(kernel.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>() / norm(kernel).powi(2)
         };
@@ -261,10 +269,10 @@ impl<'a> Frame<'a> {
         self.kept.iter().fold(0.0, |m, &i| self.v[i].abs().max(m))
     }
 
-    /// Smallest and largest position of the judged rows.
+    /// Smallest and largest position of the recording.
     #[must_use]
     pub fn stroke(&self) -> (f64, f64) {
-        self.kept.iter().fold((f64::MAX, f64::MIN), |(lo, hi), &i| (self.x[i].min(lo), self.x[i].max(hi)))
+        self.stroke
     }
 
     /// The belief's base torque at the judged rows.
@@ -278,6 +286,17 @@ impl<'a> Frame<'a> {
             })
             .collect()
     }
+}
+
+/// How sharply a column bends at each row (its second difference), beyond what its noise does: four deviations, by the median.
+fn beyond_noise(values: &[f64]) -> Vec<f64> {
+    let bend = |row: usize| match values.get(row.wrapping_sub(1)..row + 2) {
+        Some(&[before, at, after]) => (after - 2.0 * at + before).abs(),
+        _ => 0.0,
+    };
+    let bends: Vec<f64> = (0..values.len()).map(bend).collect();
+    let noise = 4.0 * 1.4826 * crate::analysis::statistics::median(&bends).unwrap_or(0.0);
+    bends.into_iter().map(|bend| (bend - noise).max(0.0)).collect()
 }
 
 /// Catmull–Rom cubic through equidistant values, held at the ends.

@@ -85,7 +85,8 @@ fn fitted_without(axis: &Axis, bench: &Bench, fit: &Fit, half: usize) -> Axis {
         let of = |c: &[f64]| (part.law.effect)(bench.frame, &part.shape, c);
         of(&coefficients[i]).or_else(|| of(&fit.coefficients[i])).map(|e| belief::together(axis, e))
     };
-    let effects: Vec<Effect> = fit.parts.iter().enumerate().filter_map(effect).collect();
+    let mut effects: Vec<Effect> = fit.parts.iter().enumerate().filter_map(effect).collect();
+    belief::reconcile(bench.frame.axis, effects.iter_mut());
     belief::extended(axis, &effects)
 }
 

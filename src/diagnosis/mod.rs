@@ -18,6 +18,7 @@ pub mod frame;
 pub mod gain;
 mod json;
 pub mod progress;
+pub mod sampling;
 pub mod select;
 pub mod show;
 pub mod uncertainty;

@@ -8,6 +8,7 @@
 use super::causes::Law;
 use super::fit::{Bench, Fit, Part, dot, figure};
 use super::progress::{Stopped, Watch};
+use super::uncertainty;
 use crate::machine::Cause;
 use std::collections::HashMap;
 
@@ -22,8 +23,18 @@ const AT_A_TIME: usize = 8;
 /// Least gain of a cause in Σ ln(mean square): 8 % of what is left. A smaller one would not be worth a machinist's time,
 /// and imperfect filters, grids and reversals make up to half of it on machines without any fault.
 pub const LEAST_GAIN: f64 = 0.08;
+/// Least gain at the best start for a cause to be refined. Starts lie close enough for half of what refining brings; the size
+/// of a cause without a coefficient is not fitted before it is refined.
+const LEAST_AT_START: f64 = 0.25 * LEAST_GAIN;
 /// What a further fitted number must gain where sets of causes compete.
 const NUMBER_PRICE: f64 = 0.003;
+
+/// Least mean over scatter of the blocks' gains, times √blocks. What only one block shows (one rapid in which the motor
+/// saturates) gives exactly 1 and may count: the others predicted it, or the gain held out would not be there.
+const LEAST_T: f64 = 0.9;
+
+/// Least size of a cause in its standard deviations: it must be known to be there at all.
+const LEAST_STRENGTH: f64 = 2.5;
 
 /// The set of causes that explains the recording best, and the runners-up for its first cause.
 #[derive(Debug)]
@@ -124,10 +135,13 @@ fn grow(search: &Search, set: &Fit, (from, to): (f64, f64)) -> Result<Vec<Fit>, 
             } else {
                 shelf.get(&law.cause).map_or(&[], Vec::as_slice)
             };
+            let least =
+                |part: &Part| if part.has_coefficients() { set.figure() - LEAST_AT_START } else { f64::INFINITY };
             let scored = parts
                 .iter()
                 .map(|part| (figure(&bench.joined(set, part)) + NUMBER_PRICE * part.shape.len() as f64, part));
-            scored.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(value, part)| (value, part.clone()))
+            let best = scored.min_by(|a, b| a.0.total_cmp(&b.0));
+            best.filter(|(value, part)| *value < least(part)).map(|(value, part)| (value, part.clone()))
         })?
         .into_iter()
         .flatten()
@@ -160,19 +174,27 @@ fn shrink(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
     fit = bench.refine(fit, 0, 8);
     while !fit.parts.is_empty() {
         let each: Vec<usize> = (0..fit.parts.len()).collect();
-        let without = watch.each(&each, (0.8, 0.9), "leaving out what is not needed", |&i| {
+        let mut without = watch.each(&each, (0.8, 0.9), "leaving out what is not needed", |&i| {
             let mut parts = fit.parts.clone();
             parts.remove(i);
             bench.refine(bench.fit(parts), 0, 4)
         })?;
-        let weakest = without.into_iter().min_by(|a, b| price(a).total_cmp(&price(b)));
-        let Some(weakest) = weakest else { break };
-        if price(&weakest) - price(&fit) >= LEAST_GAIN && borne_out(bench, &weakest, &fit) {
+        let Some(&weakest) = each.iter().min_by(|a, b| price(&without[**a]).total_cmp(&price(&without[**b]))) else {
             break;
-        }
-        fit = weakest;
+        };
+        let needed = price(&without[weakest]) - price(&fit) >= LEAST_GAIN && borne_out(bench, &without[weakest], &fit);
+        let dropped = if needed { doubtful(bench, &fit) } else { Some(weakest) };
+        let Some(dropped) = dropped else { break };
+        fit = without.swap_remove(dropped);
     }
     Ok(fit)
+}
+
+/// The part of which least is known that it is there at all.
+fn doubtful(bench: &Bench, fit: &Fit) -> Option<usize> {
+    let strengths = uncertainty::strengths(bench, fit);
+    let weakest = (0..strengths.len()).min_by(|&a, &b| strengths[a].total_cmp(&strengths[b]))?;
+    (strengths[weakest] < LEAST_STRENGTH).then_some(weakest)
 }
 
 /// Whether held-out blocks bear out what `full` gains over `less`.
@@ -182,7 +204,7 @@ fn borne_out(bench: &Bench, less: &Fit, full: &Fit) -> bool {
     let mean = gains.iter().sum::<f64>() / gains.len() as f64;
     let scatter = (gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (gains.len() as f64 - 1.0)).sqrt();
     let in_sample = (less.squares() - full.squares()) / gains.len() as f64;
-    mean > 0.5 * in_sample && mean * (gains.len() as f64).sqrt() > 1.0 * scatter
+    mean > 0.5 * in_sample && mean * (gains.len() as f64).sqrt() > LEAST_T * scatter
 }
 
 /// Sum of squares of each block, predicted by coefficients that were fitted without it.

@@ -7,25 +7,72 @@
 //! stated is that of a normal distribution whose 95 % are as wide as those of Student's with as many degrees of freedom as
 //! blocks effectively take part (Imbens and Kolesár 2016).
 
-use super::fit::{Bench, Fit, dot};
+use super::fit::{Bench, Fit, Part, Slope, dot};
 use crate::machine::Effect;
 use nalgebra::{DMatrix, DVector};
+
+/// Unknowns of a fit, as columns of its equations: coefficients of all parts in order, then the non-linear parameters.
+struct Unknowns<'s> {
+    columns: Vec<&'s [f64]>,
+    /// Where the coefficients of each part begin.
+    coefficient_at: Vec<usize>,
+    first_slope: usize,
+}
+
+impl<'s> Unknowns<'s> {
+    fn of(fit: &'s Fit, slopes: &'s [Slope]) -> Self {
+        let mut columns: Vec<&[f64]> = Vec::new();
+        let mut coefficient_at = Vec::new();
+        for (i, c) in fit.coefficients.iter().enumerate() {
+            coefficient_at.push(columns.len());
+            columns.extend(fit.columns(i).iter().take(c.len()).map(Vec::as_slice));
+        }
+        let first_slope = columns.len();
+        columns.extend(slopes.iter().map(|s| s.column.as_slice()));
+        Self { columns, coefficient_at, first_slope }
+    }
+}
+
+/// By how many of its standard deviations each part is there at all: its coefficients together (Wald's test), or where it has
+/// none its first parameter, by which it is small or large.
+#[must_use]
+pub fn strengths(bench: &Bench, fit: &Fit) -> Vec<f64> {
+    let slopes = bench.slopes(fit, 0);
+    let Unknowns { columns, coefficient_at, first_slope } = Unknowns::of(fit, &slopes);
+    let spread = Spread::of(bench, fit, &columns);
+    let misfit = misfit(bench, fit);
+    let alone = |unknown: usize| DVector::from_fn(columns.len(), |i, _| f64::from(u8::from(i == unknown)));
+    let of_first = |i: usize, part: &Part| {
+        let Some(at) = slopes.iter().position(|s| s.part == i && s.index == 0) else { return f64::INFINITY };
+        let size = part.shape[0].abs() / part.law.scales[0].rate(part.shape[0]);
+        size / spread.deviation(&alone(first_slope + at)).max(1e-300)
+    };
+    let of_coefficients = |first: usize, c: &[f64]| {
+        // In units of each coefficient, so that the inverse is well scaled: √(1ᵀ·C⁻¹·1).
+        let unit = |k: usize| 1.0 / c[k].abs().max(1e-300).copysign(c[k]);
+        let covariance =
+            DMatrix::from_fn(c.len(), c.len(), |i, j| spread.covariance(first + i, first + j) * unit(i) * unit(j));
+        let one = DVector::from_element(c.len(), 1.0);
+        let square = covariance.pseudo_inverse(1e-300).map_or(0.0, |inverse| one.dot(&(inverse * &one)));
+        let widening = (0..c.len()).map(|k| spread.widening(&alone(first + k)));
+        square.max(0.0).sqrt() / widening.fold(1.0, f64::max)
+    };
+    let strength = |(i, part): (usize, &Part)| {
+        let c = &fit.coefficients[i];
+        let strength = if c.is_empty() { of_first(i, part) } else { of_coefficients(coefficient_at[i], c) };
+        if part.law.simulated { strength / misfit } else { strength }
+    };
+    fit.parts.iter().enumerate().map(strength).collect()
+}
 
 /// Effects with the standard deviation of each parameter, in the order of the fit's parts. `None` where the parameters
 /// left their physical bounds.
 #[must_use]
 pub fn effects(bench: &Bench, fit: &Fit) -> Vec<Option<(Effect, Vec<f64>)>> {
-    // Unknowns: coefficients of all parts in order, then the non-linear parameters.
     let slopes = bench.slopes(fit, 0);
-    let mut columns: Vec<&[f64]> = Vec::new();
-    let mut coefficient_at = Vec::new();
-    for (i, c) in fit.coefficients.iter().enumerate() {
-        coefficient_at.push(columns.len());
-        columns.extend(fit.columns(i).iter().take(c.len()).map(Vec::as_slice));
-    }
-    let first_slope = columns.len();
-    columns.extend(slopes.iter().map(|s| s.column.as_slice()));
+    let Unknowns { columns, coefficient_at, first_slope } = Unknowns::of(fit, &slopes);
     let spread = Spread::of(bench, fit, &columns);
+    let misfit = misfit(bench, fit);
     fit.parts
         .iter()
         .enumerate()
@@ -58,10 +105,23 @@ pub fn effects(bench: &Bench, fit: &Fit) -> Vec<Option<(Effect, Vec<f64>)>> {
                 let rate = scale.rate(part.shape[slope.index]);
                 differ(first_slope + s, step / rate, effect_of(&shape, &fit.coefficients[i]));
             }
-            let deviations = (0..values.len()).map(|k| spread.deviation(&gradient.row(k).transpose())).collect();
+            let widened = if part.law.simulated { misfit } else { 1.0 };
+            let deviation = |k| widened * spread.deviation(&gradient.row(k).transpose());
+            let deviations = (0..values.len()).map(deviation).collect();
             Some((effect, deviations))
         })
         .collect()
+}
+
+/// What is left over its noise floor, 1 or more. Where a simulation is fitted, what is left is its own error, alike in every
+/// block, of which a jackknife knows nothing (Birge 1932: errors grow with the root of the reduced χ²).
+fn misfit(bench: &Bench, fit: &Fit) -> f64 {
+    let rest = bench.rest(fit);
+    let over = |(c, rest): (usize, &Vec<f64>)| {
+        let square = dot(rest, rest) / rest.len().max(1) as f64;
+        square.sqrt() / bench.frame.floor(rest, c == 0).max(1e-300)
+    };
+    rest.iter().enumerate().filter(|(_, rest)| !rest.is_empty()).map(over).fold(1.0, f64::max)
 }
 
 /// What the blocks say about all unknowns.
@@ -110,14 +170,25 @@ impl Spread {
         Spread { moves, shares }
     }
 
+    /// Covariance of two unknowns.
+    fn covariance(&self, i: usize, j: usize) -> f64 {
+        let blocks = self.moves.len() as f64;
+        self.moves.iter().map(|m| m[i] * m[j]).sum::<f64>() * (blocks - 1.0) / blocks
+    }
+
     /// Deviation of the parameter with this gradient by the unknowns.
     fn deviation(&self, gradient: &DVector<f64>) -> f64 {
         let blocks = self.moves.len() as f64;
         let variance: f64 = self.moves.iter().map(|m| gradient.dot(m).powi(2)).sum::<f64>() * (blocks - 1.0) / blocks;
+        variance.max(0.0).sqrt() * self.widening(gradient)
+    }
+
+    /// By how much few blocks widen it.
+    fn widening(&self, gradient: &DVector<f64>) -> f64 {
         let shares: Vec<f64> = self.shares.iter().map(|s| gradient.dot(&(s * gradient)).max(0.0)).collect();
         let (sum, squares) = shares.iter().fold((0.0, 0.0), |(sum, squares), s| (sum + s, squares + s * s));
         let taking_part = if squares > 0.0 { sum * sum / squares } else { 1.0 };
-        variance.max(0.0).sqrt() * widening(taking_part)
+        widening(taking_part)
     }
 }
 

@@ -124,7 +124,7 @@ pub fn diagnose(
         return Ok(insufficient(axis, missing));
     }
     watch.at(0.05, "reading the motion")?;
-    let bench = Bench::new(&frame, &frame.believed());
+    let bench = Bench::new(&frame, &belief::trace(axis, &frame));
     let empty = bench.fit(Vec::new());
     let laws: Vec<&'static Law> = LAWS.iter().copied().filter(|law| belief::may_be_found(axis, law.cause)).collect();
     let selection = select(&bench, &laws, &watch)?;
@@ -246,7 +246,8 @@ fn rms(values: &[f64]) -> f64 {
 }
 
 fn findings(axis: &Axis, bench: &Bench, fit: &Fit, selection: &Selection, empty: &Fit) -> Vec<Finding> {
-    let effects = uncertainty::effects(bench, fit);
+    let mut effects = uncertainty::effects(bench, fit);
+    belief::reconcile(bench.frame.axis, effects.iter_mut().flatten().map(|(effect, _)| effect));
     let total = 1.0 - (fit.squares() / empty.squares()).min(1.0);
     let drops: Vec<f64> = (0..fit.parts.len())
         .map(|i| {

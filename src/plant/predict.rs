@@ -26,8 +26,6 @@ pub struct TorquePrediction {
     pub torque: Vec<f64>,
     /// The axis's numbers, with the phases that were estimated.
     pub physics: Physics,
-    /// Table − motor by clearance and spring, load units, one value a row, where the table is simulated behind the motor.
-    pub table_lag: Option<Vec<f64>>,
     /// Ripples whose phase could not be had from the first quarter: they are left out of the prediction.
     pub phases_unknown: usize,
 }
@@ -43,9 +41,8 @@ pub fn predict_torque(axis: &Axis, observed: &Observed) -> Result<TorquePredicti
 
     let nothing = || vec![f64::NAN; observed.time_s.len()];
     let mut delivered = nothing();
-    let mut table_lag = physics.two_masses.map(|_| nothing());
     for run in &observed.runs {
-        needed_torque(&physics, observed, run.clone(), &mut delivered, table_lag.as_deref_mut());
+        needed_torque(&physics, observed, run.clone(), &mut delivered);
     }
     (physics.cogging, physics.vibration) = ripples;
     let phases_unknown = set_phases(&mut physics, observed, &delivered, shift);
@@ -64,7 +61,7 @@ pub fn predict_torque(axis: &Axis, observed: &Observed) -> Result<TorquePredicti
             torque[run.start + i] = if shift == 0.0 { part[i] } else { cubic_at(part, i as f64 - shift) };
         }
     }
-    Ok(TorquePrediction { torque, physics, table_lag, phases_unknown })
+    Ok(TorquePrediction { torque, physics, phases_unknown })
 }
 
 /// How much later than the torque of the motion the logged one is by sampling alone, s.
@@ -87,30 +84,15 @@ pub fn sampling_shift_s(axis: &Axis, row_period_s: f64) -> f64 {
 }
 
 /// Torque that the motor must deliver, without ripples, for one run of rows.
-fn needed_torque(
-    physics: &Physics,
-    observed: &Observed,
-    run: Range<usize>,
-    torque: &mut [f64],
-    table_lag: Option<&mut [f64]>,
-) {
+fn needed_torque(physics: &Physics, observed: &Observed, run: Range<usize>, torque: &mut [f64]) {
     let scale = physics.motor_per_load;
     let (motion, time) = (&observed.motion, &observed.time_s);
     // Three standard deviations of what the position leaves open: less would turn on noise, more turns late. Never nothing.
     let smallest = (3.0 * motion.resolution * scale).max(1e-9 * scale);
     let travel = physics.presliding.unwrap_or(0.0).max(smallest);
     let transmitted = physics.two_masses.map(|masses| {
-        let simulated = |lag: Option<&mut [f64]>| table_torque(physics, &masses, observed, run.clone(), lag);
-        let measured = measured_table_torque(physics, &masses, observed, run.clone());
-        let lag = table_lag.map(|lag| &mut lag[run.clone()]);
-        match (measured, lag) {
-            (Some(measured), Some(lag)) => {
-                simulated(Some(lag));
-                measured
-            }
-            (None, lag) => simulated(lag),
-            (Some(measured), None) => measured,
-        }
+        measured_table_torque(physics, &masses, observed, run.clone())
+            .unwrap_or_else(|| table_torque(physics, &masses, observed, run.clone()))
     });
     let (inertia, share) = match &physics.two_masses {
         Some(masses) => (masses.motor_inertia, 1.0 - masses.table_friction_share),
@@ -166,13 +148,7 @@ fn measured_table_torque(
 }
 
 /// Torque that the table takes from a motor that moves as measured: the table is simulated behind its spring or clearance.
-fn table_torque(
-    physics: &Physics,
-    masses: &TwoMasses,
-    observed: &Observed,
-    run: Range<usize>,
-    mut lag: Option<&mut [f64]>,
-) -> Vec<f64> {
+fn table_torque(physics: &Physics, masses: &TwoMasses, observed: &Observed, run: Range<usize>) -> Vec<f64> {
     let scale = physics.motor_per_load;
     let motion = &observed.motion;
     let share = masses.table_friction_share;
@@ -184,9 +160,6 @@ fn table_torque(
     // Mean of the torque between each row and the next.
     let mut means = Vec::with_capacity(run.len());
     for i in run.start..run.end - 1 {
-        if let Some(slot) = lag.as_deref_mut().and_then(|lag| lag.get_mut(i - run.start)) {
-            *slot = q / scale - motion.position[i];
-        }
         let span = observed.time_s[i + 1] - observed.time_s[i];
         let steps = (span / longest_step_s(masses, masses.table_inertia)).ceil().clamp(1.0, 1000.0);
         let h = span / steps;

@@ -11,6 +11,7 @@ use super::outside::{self, Outside};
 use super::random::Random;
 use super::record::{self, Recording};
 use super::rig::{Rig, Scale};
+use super::rough::Rough;
 use super::truth::Truth;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -102,8 +103,11 @@ fn apart(a: &[f64], b: &[f64], offset: f64) -> f64 {
 }
 
 impl Bench {
-    fn draw(kind: Kind, longest: f64, random: &mut Random) -> Option<Self> {
+    fn draw(kind: Kind, longest: f64, rough: bool, random: &mut Random) -> Option<Self> {
         let mut rig = Rig::draw(random, longest);
+        if rough {
+            rig.rough = Rough::draw(&rig, random);
+        }
         if let Kind::One(cause) = kind {
             if !effects::possible(cause, &rig) {
                 return None;
@@ -134,10 +138,18 @@ impl Bench {
     fn difference(&self, r: &Recording) -> f64 {
         let torque =
             apart(&r.clean_torque, &self.belief.clean_torque, 0.0) / self.rig.torque_floor().hypot(self.jitter.0);
-        let grid = self.rig.encoder_step / 12f64.sqrt();
+        let grid = self.rig.encoder_floor();
         let position = apart(&r.true_position, &self.belief.true_position, 0.0) / grid.hypot(self.jitter.1);
         let table = if r.table.is_some() { record::spread(&r.table_error) / self.rig.table_floor() } else { 0.0 };
         torque.max(position).max(table)
+    }
+
+    /// Root mean square of what a recording leaves unexplained, beyond what the belief's own run does, over the floor.
+    fn size_of(&self, r: &Recording, cause: &str) -> f64 {
+        let (all, own) = (record::rms(&r.unexplained), record::rms(&self.belief.unexplained));
+        let torque = (all * all - own * own).max(0.0).sqrt() / self.rig.torque_floor();
+        let table = if r.table.is_some() { record::spread(&r.table_error) / self.rig.table_floor() } else { 0.0 };
+        if effects::on_table_only(cause) { table } else { torque.max(table) }
     }
 
     /// Size of one effect alone.
@@ -146,7 +158,7 @@ impl Bench {
         effect.apply(&self.rig, &mut truth);
         let r = record::run(&self.rig, &truth, &self.command, SIZING_STEP, &mut Random::new(0, 0));
         // What noise hides is not there: such a size counts as none.
-        let size = size_of(&self.rig, &r, effect.cause);
+        let size = self.size_of(&r, effect.cause);
         runs_well(&self.rig, &r).then_some(if self.difference(&r) < LEAST { size.min(0.99 * LEAST) } else { size })
     }
 
@@ -190,18 +202,13 @@ fn runs_well(rig: &Rig, r: &Recording) -> bool {
     r.limited < r.command.len() / 50 && worst < 1.5 * lag + 2.0 * dynamic
 }
 
-fn size_of(rig: &Rig, r: &Recording, cause: &str) -> f64 {
-    let torque = record::rms(&r.unexplained) / rig.torque_floor();
-    let table = if r.table.is_some() { record::spread(&r.table_error) / rig.table_floor() } else { 0.0 };
-    if effects::on_table_only(cause) { table } else { torque.max(table) }
-}
-
 impl Case {
-    /// Draws case `index` of a seed, with recordings of 10 s to `longest` s. The same seed and index give the same files on every machine.
-    pub fn draw(seed: u64, index: usize, kind: Kind, longest: f64) -> Self {
+    /// Draws case `index` of a seed, with recordings of 10 s to `longest` s. On rough rigs (see `rough.rs`)
+    /// if wished. The same seed and index give the same files on every machine.
+    pub fn draw(seed: u64, index: usize, kind: Kind, longest: f64, rough: bool) -> Self {
         for draws in 1.. {
             let mut random = Random::new(seed, (index as u64) << 20 | draws);
-            if let Some(case) = Self::attempt(kind, longest, &mut random, draws as usize) {
+            if let Some(case) = Self::attempt(kind, longest, rough, &mut random, draws as usize) {
                 return case;
             }
             assert!(draws < 400, "seed {seed}, case {index}: no rig shows {kind:?}");
@@ -209,8 +216,8 @@ impl Case {
         unreachable!()
     }
 
-    fn attempt(kind: Kind, longest: f64, random: &mut Random, draws: usize) -> Option<Self> {
-        let mut bench = Bench::draw(kind, longest, random)?;
+    fn attempt(kind: Kind, longest: f64, rough: bool, random: &mut Random, draws: usize) -> Option<Self> {
+        let mut bench = Bench::draw(kind, longest, rough, random)?;
         let mut hidden = Vec::new();
         let mut sizes = Vec::new();
         let mut outside = None;
@@ -249,7 +256,7 @@ impl Case {
                 for _ in 0..4 {
                     let truth = Truth { outside: draw(magnitude), ..Truth::of(&bench.rig) };
                     let r = record::run(&bench.rig, &truth, &bench.command, SIZING_STEP, &mut Random::new(0, 0));
-                    let size = size_of(&bench.rig, &r, name);
+                    let size = bench.size_of(&r, name);
                     sizes = vec![size];
                     if !runs_well(&bench.rig, &r) || size <= 0.0 {
                         return None;

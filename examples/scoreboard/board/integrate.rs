@@ -6,6 +6,7 @@
 //! Dry friction without presliding is a hybrid automaton (Filippov; Karnopp 1985): each mass sticks or slides one way,
 //! the sliding legs are integrated by the classical Runge–Kutta method of fourth order, and a mass whose speed changes
 //! sign is caught at rest, from where it breaks away only when the rest of the forces exceeds the friction at rest.
+//! Regularised, F·tanh(w/w₀), it is one force among the others.
 //! With presliding it is Dahl's law solved in closed form over the displacement of a step, f = s·F − (s·F − f₀)·e^(−σ|Δq|/F),
 //! σ = Tc/d, with LuGre's bristle damping σ₁·ż (Canudas de Wit et al. 1995), σ₁ fading with speed. The current loop's
 //! first-order lag is exact.
@@ -35,6 +36,7 @@ pub struct Machine<'a> {
     coupling: Coupling,
     bristle_damping: f64,
     lag: f64,
+    set_valued: bool,
 }
 
 impl<'a> Machine<'a> {
@@ -54,6 +56,7 @@ impl<'a> Machine<'a> {
             coupling,
             bristle_damping,
             lag,
+            set_valued: truth.presliding == 0.0 && truth.regularised == 0.0,
         }
     }
 
@@ -126,12 +129,14 @@ impl<'a> Machine<'a> {
         let mut a = [0.0; 2];
         for i in 0..self.bodies {
             let mut sum = self.applied(i, t, q, w, torque, start);
-            if self.truth.presliding == 0.0 {
+            if self.set_valued {
                 let direction = start.direction[i];
                 if direction == 0.0 {
                     continue;
                 }
                 sum -= direction * self.level(i, t, q[i], w[i], direction);
+            } else if self.truth.presliding == 0.0 {
+                sum -= (w[i] / self.truth.regularised).tanh() * self.level(i, t, q[i], w[i], w[i].signum());
             }
             a[i] = sum / self.inertia[i];
         }
@@ -141,7 +146,7 @@ impl<'a> Machine<'a> {
     /// The motor's acceleration in this state.
     pub fn motor_acceleration(&self, m: &Motion) -> f64 {
         let mut m = *m;
-        if self.truth.presliding == 0.0 {
+        if self.set_valued {
             let torque = m.torque;
             self.break_away(&mut m, torque);
         }
@@ -162,7 +167,6 @@ impl<'a> Machine<'a> {
 
     /// One step of `h` s with the servo's output held at `u`.
     pub fn step(&self, m: &mut Motion, u: f64, h: f64) {
-        let set_valued = self.truth.presliding == 0.0;
         let (decay_half, decay) =
             if self.lag > 0.0 { ((-0.5 * h / self.lag).exp(), (-h / self.lag).exp()) } else { (0.0, 0.0) };
         let torque = if self.lag > 0.0 {
@@ -170,7 +174,7 @@ impl<'a> Machine<'a> {
         } else {
             [u; 3]
         };
-        if set_valued {
+        if self.set_valued {
             self.break_away(m, torque[0]);
         }
         let ahead = |v: &[f64; 2], d: &[f64; 2], by: f64| [v[0] + by * d[0], v[1] + by * d[1]];
@@ -188,12 +192,12 @@ impl<'a> Machine<'a> {
         for i in 0..self.bodies {
             next.q[i] = q[i] + h / 6.0 * (w[i] + 2.0 * w2[i] + 2.0 * w3[i] + w4[i]);
             next.w[i] = w[i] + h / 6.0 * (a1[i] + 2.0 * a2[i] + 2.0 * a3[i] + a4[i]);
-            if set_valued {
+            if self.set_valued {
                 if m.direction[i] != 0.0 && next.w[i] * m.direction[i] <= 0.0 {
                     next.w[i] = 0.0;
                     next.direction[i] = 0.0;
                 }
-            } else {
+            } else if self.truth.presliding > 0.0 {
                 // The bristles alone: their damping is not stored.
                 let way = next.q[i] - q[i];
                 let s = way.signum();

@@ -5,6 +5,7 @@
 //! | [`random`] | numbers that a seed repeats |
 //! | [`moves`] | what the interpolator asks |
 //! | [`rig`] | the machine as believed, and its file |
+//! | [`rough`] | what a rig may have that belief and vocabulary do not speak of |
 //! | [`effects`], [`outside`] | what is hidden: causes of the vocabulary, and others |
 //! | [`truth`], [`integrate`], [`record`] | the machine as it is, its motion, what the servo logs |
 //! | [`case`] | a rig with something hidden, sized against the noise, as files |
@@ -18,6 +19,7 @@ pub mod outside;
 pub mod random;
 pub mod record;
 pub mod rig;
+pub mod rough;
 pub mod score;
 pub mod table;
 pub mod truth;

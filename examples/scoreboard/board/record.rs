@@ -102,7 +102,8 @@ pub fn run(rig: &Rig, truth: &Truth, command: &Command, step: f64, noise: &mut R
     let mut believed = Vec::with_capacity(rows);
     for (&c, &rate) in command.position.iter().zip(&command.speed) {
         let x = motion.q[0] * rig.unit;
-        let seen = on_grid(x, rig.encoder_step);
+        let noisy = if rig.rough.encoder_noise > 0.0 { x + rig.rough.encoder_noise * noise.normal() } else { x };
+        let seen = on_grid(noisy, rig.encoder_step);
         out.position.push(seen);
         out.true_position.push(x);
         let table_at = truth.scale_reads(machine.table(&motion) * rig.unit);
@@ -115,6 +116,7 @@ pub fn run(rig: &Rig, truth: &Truth, command: &Command, step: f64, noise: &mut R
         believed.push((without_dry, if motion.w[0].abs() > still { motion.w[0].signum() } else { 0.0 }));
         let (u, limited) = servo.cycle(c / rig.unit, rate / rig.unit, seen / rig.unit);
         out.limited += usize::from(limited);
+        let u = (u + rig.rough.pulse(motion.t)).clamp(-rig.limit, rig.limit);
         for k in 0..steps {
             if k == catch {
                 caught.push(motion.torque);

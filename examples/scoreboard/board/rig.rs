@@ -6,6 +6,7 @@
 
 use super::moves::Reach;
 use super::random::Random;
+use super::rough::Rough;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 
@@ -76,6 +77,7 @@ pub struct Rig {
     /// Moving average of the command, s.
     pub smoothing: f64,
     pub duration: f64,
+    pub rough: Rough,
 }
 
 impl Rig {
@@ -171,12 +173,13 @@ impl Rig {
             reach: Reach { low, high: low + stroke, speed, acceleration },
             smoothing: if random.chance(0.5) { 0.0 } else { random.uniform(0.005, 0.04) },
             duration,
+            rough: Rough::NONE,
         }
     }
 
-    /// Torque noise, the grid it is logged on, and what the encoder's grid adds through the velocity loop: two grid errors, step/√12 each.
+    /// Torque noise, the grid it is logged on, and what the encoder adds through the velocity loop: two errors of noise and grid.
     pub fn torque_floor(&self) -> f64 {
-        let quantum = self.encoder_step / 12f64.sqrt() * 2f64.sqrt() / self.servo.period / self.unit;
+        let quantum = self.encoder_floor() * 2f64.sqrt() / self.servo.period / self.unit;
         let logged = self.torque_noise.hypot(self.torque_step / 12f64.sqrt());
         logged.hypot(self.servo.velocity_gain * quantum / if self.servo.two_sample_mean { 2.0 } else { 1.0 })
     }
@@ -184,7 +187,12 @@ impl Rig {
     /// Noise of table − encoder, load units: both grids and the scale's own noise.
     pub fn table_floor(&self) -> f64 {
         let scale = self.table.map_or(0.0, |s| s.noise * s.noise + s.step * s.step / 12.0);
-        (scale + self.encoder_step * self.encoder_step / 12.0).sqrt()
+        scale.sqrt().hypot(self.encoder_floor())
+    }
+
+    /// Noise of the encoder with its grid, load units.
+    pub fn encoder_floor(&self) -> f64 {
+        self.rough.encoder_noise.hypot(self.encoder_step / 12f64.sqrt())
     }
 
     pub fn linear(&self) -> bool {

@@ -15,6 +15,8 @@ pub struct ParameterScore {
     pub key: String,
     /// |value − true| / scale; `None`: the key is missing.
     pub error: Option<f64>,
+    /// |value − true| / std.
+    pub deviations: f64,
     /// Whether value ± 1.96 std holds the truth.
     pub covered: bool,
 }
@@ -40,6 +42,8 @@ pub struct Score {
     pub truth_over_floor: Option<f64>,
     /// Hold-out residual of the belief over that of the true machine: what there was to gain.
     pub to_gain: Option<f64>,
+    /// Verdict and names when the extended machine is believed: on the same recording, and on the hold-out.
+    pub again: Vec<(String, Vec<String>)>,
     pub seconds: f64,
     pub failure: Option<String>,
 }
@@ -51,6 +55,14 @@ fn accepted(effect: &Effect, name: &str, rig: &Rig) -> bool {
         || (effect.cause == "cable_force" && name == "constant_torque" && effect.parameters(rig).iter().any(|p| p.key == "zero_mm" && p.value != 0.0))
 }
 
+fn text(v: &Value, key: &str) -> String {
+    v.get(key).and_then(Value::as_str).unwrap_or_default().to_string()
+}
+
+fn findings(diagnosis: &Value) -> &[Value] {
+    diagnosis.get("findings").and_then(Value::as_array).map_or(&[], Vec::as_slice)
+}
+
 fn numbers(v: &Value, key: &str) -> Option<(f64, f64)> {
     let p = v.get("parameters")?.get(key)?;
     Some((p.get("value")?.as_f64()?, p.get("std")?.as_f64()?))
@@ -58,9 +70,7 @@ fn numbers(v: &Value, key: &str) -> Option<(f64, f64)> {
 
 /// Scores a diagnosis (the JSON of the contract) against the truth.
 pub fn judge(case: &Case, diagnosis: &Value) -> Score {
-    let text = |v: &Value, key: &str| v.get(key).and_then(Value::as_str).unwrap_or_default().to_string();
-    let none = Vec::new();
-    let findings = diagnosis.get("findings").and_then(Value::as_array).unwrap_or(&none);
+    let findings = findings(diagnosis);
     let named: Vec<String> = findings.iter().map(|f| text(f, "cause")).collect();
     let is_hidden = |name: &String| case.effects.iter().any(|e| accepted(e, name, &case.rig));
     let first_right = named.first().is_some_and(|n| case.effects.iter().any(|e| e.cause == n));
@@ -88,6 +98,7 @@ pub fn judge(case: &Case, diagnosis: &Value) -> Score {
                 score.parameters.push(ParameterScore {
                     cause: effect.cause.to_string(),
                     error: said.map(|(value, _)| (value - p.value).abs() / p.scale),
+                    deviations: said.map_or(f64::INFINITY, |(value, std)| (value - p.value).abs() / std),
                     covered: said.is_some_and(|(value, std)| (value - p.value).abs() <= 1.96 * std),
                     key: p.key,
                 });
@@ -125,33 +136,53 @@ fn predict(gib: &Path, machine: &Path, recording: &Path, out: &Path, moves: &[bo
     residual(out, moves)
 }
 
+impl Score {
+    /// Everything that was hidden is named and nothing else.
+    pub fn is_right(&self, case: &Case) -> bool {
+        match case.kind {
+            Kind::Nothing => self.verdict == "no_discrepancy" && self.named.is_empty(),
+            Kind::Outside(_) => self.verdict == "unknown_cause" && self.named.is_empty(),
+            _ => self.first_right && self.wrong == 0 && self.found == case.effects.len(),
+        }
+    }
+}
+
+/// Diagnoses a recording against a machine; what was said, or why nothing was.
+fn said_of(gib: &Path, machine: &Path, recording: &Path, json: &Path, more: &[&Path]) -> Result<Value, String> {
+    let mut command = Command::new(gib);
+    command.arg("diagnose").arg("--machine").arg(machine).arg("--recording").arg(recording).arg("--json").arg(json);
+    for (option, path) in ["--holdout", "--machine-out"].into_iter().zip(more) {
+        command.arg(option).arg(path);
+    }
+    let run = command.output();
+    let parsed = std::fs::read_to_string(json).ok().and_then(|t| serde_json::from_str::<Value>(&t).ok());
+    parsed.ok_or_else(|| match run {
+        Ok(o) => {
+            format!("{}: {}", o.status, String::from_utf8_lossy(&o.stderr).lines().next().unwrap_or("no message"))
+        }
+        Err(e) => format!("{}: {e}", gib.display()),
+    })
+}
+
+/// Diagnoses the extended machine on the recording it comes from and on the other of the same rig.
+pub fn again(gib: &Path, files: &Files, folder: &Path) -> Vec<(String, Vec<String>)> {
+    let extended = folder.join("extended.json");
+    let one = |(recording, name): (&Path, &str)| match said_of(gib, &extended, recording, &folder.join(name), &[]) {
+        Ok(diagnosis) => (text(&diagnosis, "verdict"), findings(&diagnosis).iter().map(|f| text(f, "cause")).collect()),
+        Err(why) => (why, Vec::new()),
+    };
+    [(files.recording.as_path(), "again.json"), (files.holdout.as_path(), "again_holdout.json")].map(one).into()
+}
+
 /// Diagnoses a case with the `gib` command and scores it.
 pub fn diagnose(gib: &Path, case: &Case, files: &Files, folder: &Path) -> Score {
     let (json, extended) = (folder.join("diagnosis.json"), folder.join("extended.json"));
     let begin = Instant::now();
-    let run = Command::new(gib)
-        .arg("diagnose")
-        .arg("--machine")
-        .arg(&files.machine)
-        .arg("--recording")
-        .arg(&files.recording)
-        .arg("--holdout")
-        .arg(&files.holdout)
-        .arg("--json")
-        .arg(&json)
-        .arg("--machine-out")
-        .arg(&extended)
-        .output();
+    let said = said_of(gib, &files.machine, &files.recording, &json, &[&files.holdout, &extended]);
     let seconds = begin.elapsed().as_secs_f64();
-    let parsed = std::fs::read_to_string(&json).ok().and_then(|t| serde_json::from_str::<Value>(&t).ok());
-    let Some(diagnosis) = parsed else {
-        let why = match run {
-            Ok(o) => {
-                format!("{}: {}", o.status, String::from_utf8_lossy(&o.stderr).lines().next().unwrap_or("no message"))
-            }
-            Err(e) => format!("{}: {e}", gib.display()),
-        };
-        return Score { failure: Some(why), seconds, ..judge(case, &Value::Null) };
+    let diagnosis = match said {
+        Ok(diagnosis) => diagnosis,
+        Err(why) => return Score { failure: Some(why), seconds, ..judge(case, &Value::Null) },
     };
     let mut score = Score { seconds, ..judge(case, &diagnosis) };
     // Only what the files can say is compared with what is true: outside effects have no true machine file.
@@ -188,7 +219,7 @@ mod tests {
 
     #[test]
     fn an_oracle_scores_full_marks_and_a_liar_none() {
-        let case = Case::draw(3, 0, Kind::One("stribeck_friction"), 11.0);
+        let case = Case::draw(3, 0, Kind::One("stribeck_friction"), 11.0, false);
         let right = judge(&case, &said(&case, 0.01, 0.006));
         assert!(right.first_right && right.found == 1 && right.wrong == 0 && !right.tied);
         assert_eq!(right.parameters.len(), 2);

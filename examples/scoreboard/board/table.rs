@@ -1,6 +1,6 @@
 //! The scoreboard: who was named for whom, and the figures that sum it up.
 
-use super::score::Score;
+use super::score::{ParameterScore, Score};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -34,6 +34,8 @@ pub struct Summary {
     pub covered: (usize, usize),
     pub against_truth: Option<f64>,
     pub truth_over_floor: Option<f64>,
+    /// Extended machines that are believed on further recordings.
+    pub believed_again: (usize, usize),
     pub seconds: Option<f64>,
     pub failures: usize,
 }
@@ -57,6 +59,10 @@ pub fn summarise(scores: &[Score]) -> Summary {
         covered: (parameters.iter().filter(|p| p.covered).count(), parameters.len()),
         against_truth: known(&|s| s.against_truth),
         truth_over_floor: known(&|s| s.truth_over_floor),
+        believed_again: {
+            let all: Vec<_> = scores.iter().flat_map(|s| &s.again).collect();
+            (all.iter().filter(|(verdict, _)| verdict == "no_discrepancy").count(), all.len())
+        },
         seconds: median(scores.iter().map(|s| s.seconds).collect()),
         failures: scores.iter().filter(|s| s.failure.is_some()).count(),
     }
@@ -98,23 +104,28 @@ fn confusion(scores: &[Score]) -> String {
     out
 }
 
-/// Median error and coverage by cause and parameter.
+/// Median error by cause and parameter, how many intervals hold the truth, and the median and largest error in standard
+/// deviations: honest ones have a median of 0.67.
 fn parameters(scores: &[Score]) -> String {
-    let mut rows: BTreeMap<(String, String), Vec<(f64, bool)>> = BTreeMap::new();
+    let mut rows: BTreeMap<(String, String), Vec<&ParameterScore>> = BTreeMap::new();
     for p in scores.iter().flat_map(|s| &s.parameters) {
-        rows.entry((p.cause.clone(), p.key.clone())).or_default().push((p.error.unwrap_or(f64::INFINITY), p.covered));
+        rows.entry((p.cause.clone(), p.key.clone())).or_default().push(p);
     }
-    let mut out =
-        String::from("parameter                                                    cases  median error  covered\n");
+    let mut out = String::from(
+        "parameter                                                    cases  median error  covered  median std  largest\n",
+    );
     for ((cause, key), values) in rows {
-        let error = median(values.iter().map(|v| v.0).collect()).unwrap_or(f64::NAN);
-        let covered = values.iter().filter(|v| v.1).count();
+        let error = median(values.iter().map(|p| p.error.unwrap_or(f64::INFINITY)).collect()).unwrap_or(f64::NAN);
+        let covered = values.iter().filter(|p| p.covered).count();
+        let off: Vec<f64> = values.iter().map(|p| p.deviations).collect();
         let _ = writeln!(
             out,
-            "{:<60} {:>5}  {:>10.2} %  {covered:>7}",
+            "{:<60} {:>5}  {:>10.2} %  {covered:>7}  {:>10.2}  {:>7.1}",
             format!("{cause}.{key}"),
             values.len(),
-            100.0 * error
+            100.0 * error,
+            median(off.clone()).unwrap_or(f64::NAN),
+            off.into_iter().fold(0.0, f64::max)
         );
     }
     out
@@ -136,6 +147,7 @@ pub fn print(scores: &[Score]) -> String {
         ("95 % intervals that hold the truth", percent(s.covered), "90–98 %"),
         ("hold-out residual over the true model's", figure(s.against_truth, 1.0, ""), "≤ 1.10"),
         ("true model's residual over the floor", figure(s.truth_over_floor, 1.0, ""), ""),
+        ("extended machine again: no discrepancy", percent(s.believed_again), ""),
         ("seconds a case", figure(s.seconds, 1.0, " s"), ""),
         ("cases without a diagnosis", format!("{:5}", s.failures), "0"),
     ];
@@ -149,7 +161,6 @@ pub fn print(scores: &[Score]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::board::score::ParameterScore;
 
     fn score(truth: &[&str], named: &[&str], verdict: &str) -> Score {
         let is_hidden = |n: &&&str| truth.contains(n);
@@ -168,7 +179,13 @@ mod tests {
     fn every_kind_of_case_is_counted_in_its_own_share() {
         let mut hit = score(&["cogging"], &["cogging", "backlash"], "explained");
         hit.parameters = [(0.01, true), (0.05, false), (0.02, true)]
-            .map(|(e, covered)| ParameterScore { cause: "cogging".into(), key: "k".into(), error: Some(e), covered })
+            .map(|(e, covered)| ParameterScore {
+                cause: "cogging".into(),
+                key: "k".into(),
+                error: Some(e),
+                deviations: if covered { 1.0 } else { 3.0 },
+                covered,
+            })
             .to_vec();
         hit.against_truth = Some(1.05);
         let scores = [

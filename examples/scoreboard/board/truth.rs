@@ -48,6 +48,8 @@ pub struct Truth {
     pub asymmetry: f64,
     /// Torque, and speed in load units/s.
     pub stribeck: (f64, f64),
+    /// Dry friction is F·tanh(ω/this) where not 0.
+    pub regularised: f64,
     /// Displacement in units of q; 0: set-valued Coulomb friction.
     pub presliding: f64,
     /// Damping ratio of the bristle on the inertia (LuGre's σ1); 0: Dahl.
@@ -77,7 +79,7 @@ pub struct Truth {
 impl Truth {
     /// The machine that is exactly as believed.
     pub fn of(rig: &Rig) -> Self {
-        Self {
+        let mut truth = Self {
             unit: rig.unit,
             inertia: rig.inertia,
             coulomb: rig.coulomb,
@@ -86,6 +88,7 @@ impl Truth {
             coulomb_by_direction: 0.0,
             asymmetry: 0.0,
             stribeck: (0.0, 1.0),
+            regularised: 0.0,
             presliding: 0.0,
             bristle_damping: 0.0,
             coupling: None,
@@ -100,7 +103,9 @@ impl Truth {
             pitch: 0.0,
             pitch_wave: Sine::default(),
             outside: None,
-        }
+        };
+        rig.rough.apply(&mut truth);
+        truth
     }
 
     /// Level F of the dry friction of the whole axis, sliding in `direction` at speed `w`.

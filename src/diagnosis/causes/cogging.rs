@@ -9,6 +9,7 @@ pub static LAW: Law = Law {
     scales: &[Scale::Linear(1.5, 1e6, 0.02)],
     starts: |frame, rest| periods::along_stroke(frame, rest.torque),
     starts_from_rest: true,
+    simulated: false,
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let (sine, cosine) = periods::waves(frame, shape[0]);

@@ -5,6 +5,9 @@ use super::table_side;
 use super::*;
 use std::f64::consts::TAU;
 
+/// Ratio of a start's frequency to the one before.
+const STEP: f64 = 1.08;
+
 /// Parameters: resonance in Hz, share of the inertia and of the friction on the table's side, damping ratio.
 pub static LAW: Law = Law {
     cause: Cause::DriveCompliance,
@@ -15,11 +18,14 @@ pub static LAW: Law = Law {
         Scale::Log(2e-3, 0.6),
     ],
     starts: |frame, _| {
-        let most = (0.25 / frame.columns.period_s).min(300.0);
-        let frequencies = log_spaced(10.0, most.max(20.0), 14);
-        frequencies.map(|f| vec![f, 0.33, 0.7, 0.04]).collect()
+        // Behind a motor that moves as measured the table swings at its own frequency √(k/J₂), within a band of twice the
+        // damping ratio: starts farther apart than that would miss it.
+        let (least, most, share) = (8.0, (0.25 / frame.columns.period_s).min(300.0), 0.33f64);
+        let count = ((most / least).ln() / STEP.ln()).ceil().max(2.0) as usize;
+        log_spaced(least, most, count).map(|own| vec![own / (1.0 - share).sqrt(), share, 0.7, 0.04]).collect()
     },
     starts_from_rest: false,
+    simulated: true,
     terms: |frame, shapes| {
         let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(frame, shape)).collect();
         table_side::terms(frame, &effects)

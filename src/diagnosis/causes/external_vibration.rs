@@ -8,6 +8,7 @@ pub static LAW: Law = Law {
     scales: &[Scale::Linear(3.0, 1e9, 0.02)],
     starts: |frame, rest| periods::along_time(frame, rest.torque),
     starts_from_rest: true,
+    simulated: false,
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let per_second = shape[0] / duration(frame);

@@ -23,7 +23,7 @@ mod torque_saturation;
 mod viscous_friction_mismatch;
 
 pub(super) mod periods;
-mod table_side;
+pub(super) mod table_side;
 
 use super::frame::Frame;
 use crate::machine::{Axis, Cause, Effect};
@@ -98,6 +98,8 @@ pub struct Law {
     pub starts: fn(&Frame, &Rest) -> Vec<Vec<f64>>,
     /// Whether the starts depend on what is left.
     pub starts_from_rest: bool,
+    /// Whether the trace is a simulation of what happens between the rows.
+    pub simulated: bool,
     /// The traces at given non-linear parameters, one for each set of them.
     pub terms: fn(&Frame, &[Vec<f64>]) -> Vec<Term>,
     /// The effect that parameters and coefficients stand for; `None` beyond physical bounds.

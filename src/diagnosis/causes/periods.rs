@@ -8,6 +8,9 @@ use std::f64::consts::TAU;
 const STROKE_BINS: usize = 1 << 14;
 /// Starts handed on from each octave.
 const MOST: usize = 2;
+/// Least share of the rest's squares that a peak explains by its height. A cause needs eight times as much to be named, and
+/// the raster of bins and frequencies costs a peak a quarter at most.
+const LEAST_SHARE: f64 = 0.01;
 
 /// Sine and cosine with this many periods over the stroke, every row.
 pub fn waves(frame: &Frame, periods: f64) -> (Vec<f64>, Vec<f64>) {
@@ -52,7 +55,7 @@ pub fn along_stroke(frame: &Frame, rest: &[f64]) -> Vec<Vec<f64>> {
     // Two transform lengths over the stroke: half periods are resolved. Periods below eight bins or eight encoder steps,
     // and fewer than five over the stroke, are not looked for.
     let most = (STROKE_BINS / 8).min((stroke / (8.0 * frame.grid.max(1e-9))) as usize);
-    let mut starts = peaks(&mut bins, 10, 2 * most, 0.5);
+    let mut starts = peaks(&mut bins, (10, 2 * most), 0.5, least_power(rest));
     if let crate::machine::Drive::BallScrew { lead_mm } = frame.axis.drive {
         let poles = f64::from(frame.axis.motor_pole_pairs.unwrap_or(4));
         let likely = [1.0, 2.0, poles, 2.0 * poles, 6.0 * poles].map(|n| n * stroke / lead_mm);
@@ -67,7 +70,8 @@ pub fn along_time(frame: &Frame, rest: &[f64]) -> Vec<Vec<f64>> {
     let length = bins.len() as f64;
     let cycles = (frame.x.len() - 1) as f64 / stride as f64 / length;
     // Ten periods at least.
-    peaks(&mut bins, (10.0 / cycles) as usize, (length * visible(frame, stride)) as usize, cycles)
+    let range = ((10.0 / cycles) as usize, (length * visible(frame, stride)) as usize);
+    peaks(&mut bins, range, cycles, least_power(rest))
 }
 
 /// Amplitudes of lines over frequency, Hz: the largest within each of some hundred bands of equal ratio.
@@ -120,8 +124,13 @@ fn power(values: &mut [f64]) -> Vec<f64> {
     spectrum.iter().map(|c| c.norm_sqr()).collect()
 }
 
+/// Power of a wave that explains the least share: sine and cosine take 2·|F|²/n off the sum of squares.
+fn least_power(rest: &[f64]) -> f64 {
+    0.5 * LEAST_SHARE * rest.len() as f64 * rest.iter().map(|r| r * r).sum::<f64>()
+}
+
 /// The largest local peaks of the power spectrum in each octave between two bins, as multiples of `unit`.
-fn peaks(values: &mut [f64], from: usize, to: usize, unit: f64) -> Vec<Vec<f64>> {
+fn peaks(values: &mut [f64], (from, to): (usize, usize), unit: f64, least: f64) -> Vec<Vec<f64>> {
     let power = power(values);
     let to = to.min(power.len().saturating_sub(1));
     // By octaves: what is left of slower causes stands high at long periods and must not hide a fine ripple.
@@ -130,7 +139,7 @@ fn peaks(values: &mut [f64], from: usize, to: usize, unit: f64) -> Vec<Vec<f64>>
     while low < to {
         let high = (2 * low).min(to);
         let mut found: Vec<usize> =
-            (low..high).filter(|&i| power[i] > power[i - 1] && power[i] >= power[i + 1]).collect();
+            (low..high).filter(|&i| power[i] > least.max(power[i - 1]) && power[i] >= power[i + 1]).collect();
         found.sort_by(|a, b| power[*b].total_cmp(&power[*a]));
         starts.extend(found.into_iter().take(MOST).map(|i| vec![i as f64 * unit]));
         low = high;

@@ -8,10 +8,11 @@ pub static LAW: Law = Law {
     scales: &[Scale::Linear(1.5, 1e6, 0.02)],
     starts: |frame, rest| if rest.table.is_empty() { Vec::new() } else { periods::along_stroke(frame, rest.table) },
     starts_from_rest: true,
+    simulated: false,
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let (sine, cosine) = periods::waves(frame, shape[0]);
-            let (sine, cosine) = (frame.judged_table(&sine), frame.judged_table(&cosine));
+            let (sine, cosine) = (frame.low_passed(&sine), frame.low_passed(&cosine));
             Term { fixed: None, regressors: vec![Trace::table(sine), Trace::table(cosine)] }
         })
     },

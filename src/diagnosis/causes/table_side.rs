@@ -1,87 +1,238 @@
-//! The table behind a spring, driven by the measured motion of the motor.
+//! The table behind a spring or a clearance, driven by the measured motion of the motor.
 //!
-//! J₂·ẍ₂ = c − φ·(Tc·sign(ẋ₂) + Tv·ẋ₂) − T0, with c = k·(x₁ − x₂) + d·(ẋ₁ − ẋ₂); the motor then needs
+//! J₂·ẍ₂ = c − φ·(Tc·Sign(ẋ₂) + Tv·ẋ₂) − T0, with c = k·(x₁ − x₂) + d·(ẋ₁ − ẋ₂) beyond the dead zone; the motor then needs
 //! T = J₁·ẍ₁ + (1 − φ)·(Tc·sign(ẋ₁) + Tv·ẋ₁) + c. Integrated by Moreau's time stepping: friction is the impulse that
-//! brings the table towards rest, at most φ·Tc·h, so that a table at rest stays there without chatter.
+//! brings the table towards rest, at most φ·Tc·h, so that a table at rest stays there without chatter. Between rows the
+//! motor goes along the cubic of its positions and speeds: a straight line would take (ω·h)²/12 off what swings at ω, which
+//! looks like another inertia. The motion is as the encoder shows it: what smooths it takes the impacts off, and the table's
+//! torque comes out too small.
 //!
-//! Each step waits for the one before it. Several springs are therefore stepped side by side, which costs little more
-//! time than one.
+//! While the link of a clearance is loaded one way, c = J₂·ẍ₁ + φ·(Tc·sign(ẋ₁) + Tv·ẋ₁) + T0 keeps one flank in contact, the
+//! table moves with the motor, and nothing need be simulated.
 
 use super::*;
+use crate::diagnosis::sampling::NUMEROV;
 use crate::machine::TwoMasses;
-
-/// Springs that are stepped together.
-const LANES: usize = 8;
+use std::ops::Range;
 
 /// The traces in the torque (against the rigid axis) and in table − encoder, of each effect.
 pub fn terms(frame: &Frame, effects: &[Option<Effect>]) -> Vec<Term> {
-    let splits: Vec<Option<TwoMasses>> =
-        effects.iter().map(|e| e.and_then(|e| frame.axis.with_effects(vec![e]).two_masses().ok().flatten())).collect();
+    let split = |e: &Option<Effect>| e.and_then(|e| frame.axis.with_effects(vec![e]).two_masses().ok().flatten());
+    terms_of(frame, &effects.iter().map(split).collect::<Vec<_>>())
+}
+
+/// The trace of what an axis is believed to have between motor and table; `None` where that is nothing.
+pub fn believed(frame: &Frame, axis: &Axis) -> Option<Trace> {
+    let masses = axis.two_masses().ok().flatten()?;
+    terms_of(frame, &[Some(masses)]).swap_remove(0).fixed
+}
+
+fn terms_of(frame: &Frame, splits: &[Option<TwoMasses>]) -> Vec<Term> {
     let sound: Vec<TwoMasses> = splits.iter().copied().flatten().collect();
-    let mut found = sound.chunks(LANES).flat_map(|chunk| together(frame, chunk)).collect::<Vec<_>>().into_iter();
+    let together = |masses: &[TwoMasses]| Tables::new(frame, masses).terms(masses.len());
+    let mut found = sound.chunks(LANES).flat_map(together).collect::<Vec<_>>().into_iter();
     splits.iter().map(|split| split.and_then(|_| found.next()).unwrap_or_default()).collect()
 }
 
+/// How long flanks swing after they have met, s: three time constants of their damping.
+const SWING_S: f64 = 4e-3;
+/// Tables that are simulated side by side: each step waits for the one before it, so that several cost little more than one.
+const LANES: usize = 8;
+/// Radians of the fastest swing to a step.
+const STEP_RAD: f64 = 0.35;
+
 type Lanes = [f64; LANES];
 
-/// The traces of up to [`LANES`] springs.
-fn together(frame: &Frame, splits: &[TwoMasses]) -> Vec<Term> {
-    let b = &frame.belief;
-    let h = frame.columns.period_s;
-    let fastest = splits.iter().map(|s| (s.stiffness / s.table_inertia).sqrt().max(s.damping / s.table_inertia));
-    let steps = ((h * fastest.fold(0.0, f64::max) / 0.5).ceil() as usize).clamp(2, 64);
-    let dt = h / steps as f64;
-    // Lanes without a spring repeat the last.
-    let lanes = |of: &dyn Fn(&TwoMasses) -> f64| -> Lanes {
-        std::array::from_fn(|l| splits.get(l).or(splits.last()).map_or(1.0, of))
-    };
-    let (stiffness, damping) = (lanes(&|s| s.stiffness), lanes(&|s| s.damping));
-    let per_inertia = lanes(&|s| dt / s.table_inertia);
-    let inertia = lanes(&|s| s.table_inertia);
-    let coulomb = lanes(&|s| s.table_friction_share * b.coulomb);
-    let viscous = lanes(&|s| s.table_friction_share * b.viscous);
-    let rub = lanes(&|s| dt * s.table_friction_share * b.coulomb / s.table_inertia);
-    let position = &frame.columns.position;
-    let with_table = frame.columns.table.is_some();
-    let mut extra = vec![vec![0.0; position.len()]; splits.len()];
-    let mut twist_of = vec![vec![0.0; if with_table { position.len() } else { 0 }]; splits.len()];
-    for s in &frame.columns.stretches {
-        let origin = position[s.start];
-        let motor = |i: usize| (position[i] - origin) * frame.unit;
-        let (mut x, mut v): (Lanes, Lanes) = ([0.0; LANES], [0.0; LANES]);
-        for i in s.clone() {
-            let (now, next) = (motor(i), motor((i + 1).min(s.end - 1)));
-            let previous = motor(i.saturating_sub(1).max(s.start));
-            let rate = (next - previous) / (2.0 * h);
-            let a = (next - 2.0 * now + previous) / (h * h);
-            let direction = frame.direction[i];
-            let mut row: Lanes = [0.0; LANES];
-            for l in 0..LANES {
-                let link = stiffness[l] * (now - x[l]) + damping[l] * (rate - v[l]);
-                row[l] = link - b.constant - inertia[l] * a - coulomb[l] * direction - viscous[l] * rate;
-            }
-            for (lane, value) in extra.iter_mut().zip(row) {
-                lane[i] = value;
-            }
-            for (lane, x) in twist_of.iter_mut().zip(x).filter(|_| with_table) {
-                lane[i] = (x - now) / frame.unit;
-            }
-            // Both sides of the link at the same instant: half a step between them would be a false viscous force.
-            let w = (next - now) / h;
-            for k in 0..steps {
-                let m = now + k as f64 / steps as f64 * (next - now);
-                for l in 0..LANES {
-                    let link = stiffness[l] * (m - x[l]) + damping[l] * (w - v[l]);
-                    let free = v[l] + per_inertia[l] * (link - b.constant - viscous[l] * v[l]);
-                    v[l] = free - free.max(-rub[l]).min(rub[l]);
-                    x[l] += dt * v[l];
-                }
-            }
+fn lanes(value: impl Fn(usize) -> f64) -> Lanes {
+    std::array::from_fn(value)
+}
+
+/// Tables behind one motor that moves as measured; motor's coordinate.
+struct Tables<'a> {
+    frame: &'a Frame<'a>,
+    inertia: Lanes,
+    /// Share of friction, its dry level and its viscous slope.
+    share: Lanes,
+    level: Lanes,
+    viscous: Lanes,
+    /// Half the clearance.
+    half: Lanes,
+    stiffness: Lanes,
+    damping: Lanes,
+    /// Steps a row.
+    steps: usize,
+    /// Wind-up of the real spring over that of the simulated one.
+    wind: Lanes,
+    /// Whether there is a dead zone: flanks push and never pull.
+    flanks: bool,
+}
+
+/// Where the tables are.
+struct State {
+    position: Lanes,
+    speed: Lanes,
+    /// Rows since the flanks met last, while they stay together, and the way they push.
+    together: [usize; LANES],
+    side: Lanes,
+    /// Not known to move with the motor.
+    loose: [bool; LANES],
+}
+
+impl<'a> Tables<'a> {
+    fn new(frame: &'a Frame<'a>, masses: &[TwoMasses]) -> Self {
+        let b = &frame.belief;
+        // Lanes without a table of their own repeat the last.
+        let of = |value: fn(&TwoMasses) -> f64| lanes(|l| masses.get(l).or(masses.last()).map_or(1.0, value));
+        let share = of(|m| m.table_friction_share);
+        let fastest = masses.iter().map(|m| (m.stiffness / m.table_inertia).sqrt().max(m.damping / m.table_inertia));
+        let steps = (frame.columns.period_s * fastest.fold(0.0, f64::max) / STEP_RAD).ceil().clamp(1.0, 1000.0);
+        let (flanks, h) = (masses.iter().any(|m| m.clearance > 0.0), frame.columns.period_s / steps);
+        // In steps of h a spring swings at ω when it is softer by (sin(ωh/2)/(ωh/2))² (leapfrog integration).
+        let swing = of(|m| (m.stiffness / m.table_inertia).sqrt()).map(|omega| (0.5 * h * omega).clamp(1e-9, 1.0));
+        let softer = swing.map(|half| (half.sin() / half).powi(2));
+        let stiffness = of(|m| m.stiffness);
+        Self {
+            frame,
+            inertia: of(|m| m.table_inertia),
+            share,
+            level: share.map(|s| s * b.coulomb),
+            viscous: share.map(|s| s * b.viscous),
+            half: of(|m| 0.5 * m.clearance),
+            stiffness: lanes(|l| stiffness[l] * softer[l]),
+            wind: if flanks { [1.0; LANES] } else { softer },
+            damping: of(|m| m.damping),
+            steps: steps as usize,
+            flanks,
         }
     }
-    let term = |(extra, twist): (Vec<f64>, Vec<f64>)| {
-        let table = if with_table { frame.judged_table(&twist) } else { Vec::new() };
-        Term { fixed: Some(Trace { torque: frame.judged(&extra), table }), regressors: Vec::new() }
-    };
-    extra.into_iter().zip(twist_of).map(term).collect()
+
+    /// The traces of the first `count` tables: torque beyond that of the rigid axis, each row the mean under a triangle over one
+    /// row to either side, and table − motor in load units.
+    fn terms(&self, count: usize) -> Vec<Term> {
+        let rows = self.frame.x.len();
+        let (mut extra, mut lag) = (vec![vec![0.0; rows]; count], vec![vec![0.0; rows]; count]);
+        for s in &self.frame.columns.stretches {
+            self.stretch(s.clone(), &mut extra, &mut lag);
+        }
+        let with_table = self.frame.columns.table.is_some();
+        let term = |(extra, lag): (Vec<f64>, Vec<f64>)| {
+            let table = if with_table { self.frame.low_passed(&lag) } else { Vec::new() };
+            Term { fixed: Some(Trace { torque: self.frame.low_passed(&extra), table }), regressors: Vec::new() }
+        };
+        extra.into_iter().zip(lag).map(term).collect()
+    }
+
+    /// Torque that the link of a rigid axis carries at a row.
+    fn carried(&self, i: usize) -> Lanes {
+        let (b, unit) = (&self.frame.belief, self.frame.unit);
+        let acceleration = self.frame.a[i] * unit;
+        let friction = b.coulomb * self.frame.direction[i] + b.viscous * self.frame.v[i] * unit;
+        lanes(|l| self.inertia[l] * acceleration + self.share[l] * friction + b.constant)
+    }
+
+    fn stretch(&self, rows: Range<usize>, extra: &mut [Vec<f64>], lag: &mut [Vec<f64>]) {
+        let unit = self.frame.unit;
+        let settled = (SWING_S / self.frame.columns.period_s).ceil() as usize;
+        // Where the table of a rigid link is at a load.
+        let behind = |l: usize, motor: f64, load: f64| motor - self.half[l].copysign(load) - load / self.stiffness[l];
+        let mut load = self.carried(rows.start);
+        let mut state = State {
+            position: [0.0; LANES],
+            speed: [0.0; LANES],
+            together: [0; LANES],
+            side: [0.0; LANES],
+            loose: [false; LANES],
+        };
+        for i in rows.start..rows.end - 1 {
+            let next = self.carried(i + 1);
+            let motor = self.frame.columns.position[i] * unit;
+            let steady = i > rows.start && self.frame.direction[i] * self.frame.direction[i + 1] > 0.5;
+            let mut any = false;
+            for l in 0..LANES {
+                // Near no load the flanks may part within the row.
+                let least = 0.1 * self.level[l];
+                let firm =
+                    self.flanks && steady && load[l].abs() > least && next[l].abs() > least && load[l] * next[l] > 0.0;
+                let held = !state.loose[l] || state.together[l] >= settled && state.side[l] * load[l] > 0.0;
+                if firm && held || !state.loose[l] {
+                    state.position[l] = behind(l, motor, load[l]);
+                    state.speed[l] = self.frame.raw_speed[i] * unit;
+                    state.together[l] = 0;
+                }
+                state.loose[l] = !(firm && held);
+                any |= state.loose[l];
+            }
+            for (l, lag) in lag.iter_mut().enumerate() {
+                lag[i] = self.wind[l] * (state.position[l] - motor) / unit;
+            }
+            if any {
+                let [near, far] = self.between(i, &mut state);
+                let rigid = self.rigid(i);
+                for (l, extra) in extra.iter_mut().enumerate().filter(|(l, _)| state.loose[*l]) {
+                    extra[i] += near[l] - rigid[0][l];
+                    extra[i + 1] += far[l] - rigid[1][l];
+                }
+            }
+            load = next;
+        }
+    }
+
+    /// What the link of a rigid axis carries between a row and the next, shared between them as [`Tables::between`] does: the
+    /// triangular mean of the acceleration is a second difference, that of friction is taken as the base takes it.
+    fn rigid(&self, i: usize) -> [Lanes; 2] {
+        let (b, unit, span) = (&self.frame.belief, self.frame.unit, self.frame.columns.period_s);
+        let step = self.frame.columns.position[i + 1] - self.frame.columns.position[i];
+        let speed = |i: usize| self.frame.raw_speed[i];
+        let friction = |i: usize| b.coulomb * self.frame.direction[i] + b.viscous * speed(i) * unit;
+        let [side, middle] = [NUMEROV[0], 0.5 * NUMEROV[1]];
+        let share = |acceleration: f64, friction: f64| {
+            lanes(|l| self.inertia[l] * acceleration * unit + self.share[l] * friction + 0.5 * b.constant)
+        };
+        [
+            share((step - span * speed(i)) / (span * span), middle * friction(i) + side * friction(i + 1)),
+            share((span * speed(i + 1) - step) / (span * span), side * friction(i) + middle * friction(i + 1)),
+        ]
+    }
+
+    /// Moves the tables on by one row; answers the share of each link's torque that belongs to the row and to the next one, by
+    /// how near it acts.
+    fn between(&self, i: usize, state: &mut State) -> [Lanes; 2] {
+        let (unit, span, constant) = (self.frame.unit, self.frame.columns.period_s, self.frame.belief.constant);
+        let at = |i: usize| (self.frame.columns.position[i] * unit, self.frame.raw_speed[i] * unit * span);
+        let ((q0, d0), (q1, d1)) = (at(i), at(i + 1));
+        let (c2, c3) = (3.0 * (q1 - q0) - 2.0 * d0 - d1, 2.0 * (q0 - q1) + d0 + d1);
+        let h = span / self.steps as f64;
+        let (mut x, mut v) = (state.position, state.speed);
+        let (mut near, mut far) = ([0.0; LANES], [0.0; LANES]);
+        let mut apart = [0.0f64; LANES];
+        for step in 0..self.steps {
+            let s = (step as f64 + 0.5) / self.steps as f64;
+            let motor = q0 + s * (d0 + s * (c2 + s * c3));
+            let speed = (d0 + s * (2.0 * c2 + s * 3.0 * c3)) / span;
+            for l in 0..LANES {
+                let middle = x[l] + 0.5 * h * v[l];
+                // Flanks push and never pull.
+                let wind = motor - middle;
+                let beyond = wind.abs() - self.half[l];
+                let outward = (speed - v[l]) * 1.0f64.copysign(wind);
+                let touching = if beyond > 0.0 { 1.0 } else { 0.0 };
+                let spring = self.stiffness[l] * beyond + self.damping[l] * outward;
+                let push = if self.flanks { touching * spring.max(0.0) } else { spring };
+                apart[l] = apart[l].max(if push > 0.0 { 0.0 } else { 1.0 });
+                let push = push * 1.0f64.copysign(wind);
+                near[l] += (1.0 - s) * push;
+                far[l] += s * push;
+                // Dry friction takes what impulse it can, and never turns it.
+                let impulse = self.inertia[l] * v[l] + h * (push - constant - self.viscous[l] * v[l]);
+                v[l] = (impulse.abs() - h * self.level[l]).max(0.0).copysign(impulse) / self.inertia[l];
+                x[l] = middle + 0.5 * h * v[l];
+            }
+        }
+        (state.position, state.speed) = (x, v);
+        state.side = lanes(|l| near[l] + far[l]);
+        for l in 0..LANES {
+            state.together[l] = if apart[l] == 0.0 { state.together[l] + 1 } else { 0 };
+        }
+        [near, far].map(|part| part.map(|sum| sum / self.steps as f64))
+    }
 }
