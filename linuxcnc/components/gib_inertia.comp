@@ -56,7 +56,8 @@ variable gib_inertia_output out;
 variable gib_speed_variation_output swing;
 variable int running = 0;
 variable int measured = 0;
-variable int started = 0;
+variable int started = 0; /* to vary, since vary rose */
+variable int swinging = 0;
 variable int fault = 0;
 variable double speed_safe = 0.0;
 
@@ -162,11 +163,12 @@ __attribute__((noinline, cold)) static int measuring(struct __comp_state *__comp
 __attribute__((noinline, cold)) static void wait_to_vary(struct __comp_state *__comp_inst, double cycle_s)
 {
     int at_speed = fabs(speed_cmd) > 1.0 && fabs(drive_speed - speed_cmd) < 0.05 * fabs(speed_cmd);
-    if (!(ina > 0.0)) {
+    if (vary && !(ina > 0.0)) {
         vary_message = GIB_ERR_PROGRAM_ABSENT;
-    } else if (at_speed && enable && !fault && !started) {
+    } else if (vary && at_speed && enable && !fault && !started) {
         vary_message = begin_to_vary(__comp_inst, cycle_s);
-        varying = vary_message == GIB_OK;
+        swinging = vary_message == GIB_OK;
+        varying = swinging;
         started = 1;
     }
 }
@@ -181,12 +183,13 @@ static double varied(struct __comp_state *__comp_inst, double wanted)
         .period_s = swing_time,
         .flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (go_on ? 0 : GIB_SPEED_VARIATION_STOP),
     };
-    varying = gib_speed_variation_step(variation, &in, &swing) == GIB_BUSY;
+    swinging = gib_speed_variation_step(variation, &in, &swing) == GIB_BUSY;
+    varying = swinging;
     vary_message = swing.message;
     amplitude_most = swing.amplitude_limit_ratio;
-    torque_ff = varying ? swing.torque_nm : 0.0;
-    amplitude_now = varying ? swing.amplitude_ratio : 0.0;
-    return varying && wanted != 0.0 ? swing.speed_command_rpm : wanted;
+    torque_ff = swinging ? swing.torque_nm : 0.0;
+    amplitude_now = swinging ? swing.amplitude_ratio : 0.0;
+    return swinging && wanted != 0.0 ? swing.speed_command_rpm : wanted;
 }
 
 FUNCTION(_)
@@ -200,16 +203,16 @@ FUNCTION(_)
         fault = GIB_ERR_NON_FINITE;
     }
     wanted = speed_safe;
-    started = started && vary && wanted != 0.0;
     if ((measure | measured | running) && measuring(__comp_inst, period * 1e-9)) {
         wanted = out.speed_command_rpm;
-    } else {
-        if (vary && !varying) {
+    } else if (vary | started) {
+        if (!swinging) {
             wait_to_vary(__comp_inst, period * 1e-9);
         }
-        if (varying) {
+        if (swinging) {
             wanted = varied(__comp_inst, wanted);
         }
+        started = swinging || (started && vary && wanted != 0.0);
     }
     drive_speed_cmd = enable ? wanted : 0.0;
     ok = ok_in && !fault;

@@ -47,6 +47,8 @@ param rw float lag = 0 "of the servo, s";
 variable gib_learning *gib;
 variable double cmd_safe = 0.0;
 variable double fb_safe = 0.0;
+variable double shift = 0.0; /* the correction, mm */
+variable int awake = 0;
 variable int asked = 0;
 variable int fault = 0;
 
@@ -87,6 +89,16 @@ static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
     return gib_learning_start(gib, &config);
 }
 
+/* How far learning has come. */
+__attribute__((noinline, cold)) static void show(struct __comp_state *__comp_inst)
+{
+    gib_learning_report report;
+    gib_learning_result(gib, &report);
+    deviation = report.last_um;
+    first = report.first_um;
+    update_count = report.updates;
+}
+
 /* One cycle of learning, or of fading out. */
 static void learn(struct __comp_state *__comp_inst)
 {
@@ -97,20 +109,30 @@ static void learn(struct __comp_state *__comp_inst)
         .flags = (drive_fault || fault ? GIB_INPUT_FAULT : 0) | (on && enable ? 0 : GIB_INPUT_ABORT),
     };
     gib_learning_output out;
-    gib_learning_report report;
     int32_t status = gib_learning_step(gib, &in, &out);
     correction = out.correction_um;
+    shift = 1e-3 * out.correction_um;
     why = out.reasons;
     if (out.phase != state) {
         state = out.phase;
-        gib_learning_result(gib, &report);
-        deviation = report.last_um;
-        first = report.first_um;
-        update_count = report.updates;
+        show(__comp_inst);
     }
     done = status == GIB_DONE;
-    busy = status == GIB_BUSY || correction != 0.0;
+    awake = status == GIB_BUSY || shift != 0.0;
+    busy = awake;
     error = status < 0 && status != GIB_ERR_ABORTED ? status : 0;
+}
+
+/* Nothing is in force, and something may be asked for. */
+__attribute__((noinline, cold)) static void ask(struct __comp_state *__comp_inst, long period)
+{
+    if (on && !asked && enable && !fault) {
+        error = begin(__comp_inst, period * 1e-9);
+        awake = error == GIB_OK;
+        busy = awake;
+    }
+    asked = on;
+    done = 0;
 }
 
 FUNCTION(_)
@@ -120,17 +142,12 @@ FUNCTION(_)
         fault = 0;
     }
     fault = gib_hal_held(position_cmd, &cmd_safe) && gib_hal_held(drive_fb, &fb_safe) ? fault : GIB_ERR_NON_FINITE;
-    if (on && !asked && enable && !busy && !fault) {
-        error = begin(__comp_inst, period * 1e-9);
-        busy = error == GIB_OK;
-    }
-    asked = on;
-    if (busy) {
+    if (awake) {
         learn(__comp_inst);
-    } else {
-        done = 0;
+    } else if (on | asked) {
+        ask(__comp_inst, period);
     }
-    drive_cmd = cmd_safe + 1e-3 * correction;
-    position_fb = fb_safe - 1e-3 * correction;
+    drive_cmd = cmd_safe + shift;
+    position_fb = fb_safe - shift;
     ok = ok_in && !fault;
 }

@@ -56,6 +56,8 @@ variable gib_tilt *gib;
 variable gib_tilt_output out;
 variable double cmd_safe = 0.0;
 variable double fb_safe = 0.0;
+variable double shift = 0.0; /* z's offset, mm */
+variable int awake = 0;
 variable int started = 0;
 variable unsigned accepted = 0;
 variable int fault = 0;
@@ -119,44 +121,59 @@ static void show(struct __comp_state *__comp_inst)
     }
 }
 
+/* One cycle of a measurement, or of an offset that comes, stays or goes. */
+__attribute__((noinline)) static void work(struct __comp_state *__comp_inst)
+{
+    gib_tilt_input in = {
+        .position_mm = {x, y, z},
+        .load = spindle_load,
+        .speed_rpm = speed,
+        .acknowledged_id = accepted,
+        .flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (cutting ? GIB_TILT_INPUT_CUTTING : 0) |
+                 (finish ? GIB_TILT_INPUT_END : 0) | (off ? GIB_TILT_INPUT_OFF : 0),
+    };
+    int before = out.phase;
+    int32_t status = gib_tilt_step(gib, &in, &out);
+    accepted = accept ? out.request_id : accepted;
+    awake = status == GIB_BUSY;
+    busy = awake;
+    if (out.phase != before) {
+        show(__comp_inst);
+        error = status < 0 ? status : 0;
+        fault = status == GIB_ERR_NON_FINITE ? status : fault;
+    }
+    warn = out.warning;
+    active = out.phase == GIB_TILT_ACTIVE;
+    state = out.phase;
+    offset_z = shift = out.offset_mm[2];
+}
+
+/* A measurement may be asked for. */
+__attribute__((noinline, cold)) static void ask(struct __comp_state *__comp_inst, long period)
+{
+    if (start && !started && enable && !awake && !fault) {
+        error = begin(__comp_inst, period * 1e-9);
+        awake = error == GIB_OK;
+        busy = awake;
+        verdict = 0;
+    }
+    started = start;
+}
+
 FUNCTION(_)
 {
-    int32_t status;
     if (!enable) {
         fault = 0;
     }
     /* What is no number goes nowhere: the last safe value stays, and motion is told. */
     fault = gib_hal_held(position_cmd, &cmd_safe) && gib_hal_held(drive_fb, &fb_safe) ? fault : GIB_ERR_NON_FINITE;
-    if (start && !started && enable && !busy && !fault) {
-        error = begin(__comp_inst, period * 1e-9);
-        busy = error == GIB_OK;
-        verdict = 0;
+    if (start | started) {
+        ask(__comp_inst, period);
     }
-    started = start;
-    if (busy) {
-        gib_tilt_input in = {
-            .position_mm = {x, y, z},
-            .load = spindle_load,
-            .speed_rpm = speed,
-            .acknowledged_id = accepted,
-            .flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (cutting ? GIB_TILT_INPUT_CUTTING : 0) |
-                     (finish ? GIB_TILT_INPUT_END : 0) | (off ? GIB_TILT_INPUT_OFF : 0),
-        };
-        int before = out.phase;
-        status = gib_tilt_step(gib, &in, &out);
-        accepted = accept ? out.request_id : accepted;
-        busy = status == GIB_BUSY;
-        if (out.phase != before) {
-            show(__comp_inst);
-            error = status < 0 ? status : 0;
-            fault = status == GIB_ERR_NON_FINITE ? status : fault;
-        }
-        warn = out.warning;
-        active = out.phase == GIB_TILT_ACTIVE;
-        state = out.phase;
-        offset_z = out.offset_mm[2];
+    if (awake) {
+        work(__comp_inst);
     }
-    drive_cmd = cmd_safe + offset_z;
-    position_fb = fb_safe - offset_z;
+    drive_cmd = cmd_safe + shift;
+    position_fb = fb_safe - shift;
     ok = ok_in && !fault;
 }

@@ -68,33 +68,50 @@ static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
     return gib_vibration_start(gib, &config, NULL);
 }
 
-FUNCTION(_)
+/* A cycle in which the correction is in force, comes or goes. */
+static void work(struct __comp_state *__comp_inst)
 {
-    int good = gib_hal_held(scale, &safe);
-    if (on && !asked && !running) {
+    gib_vibration_input in = {
+        .scale_mm = scale,
+        .angle_deg = angle,
+        .acceleration_m_s2 = {seat, bearing},
+        .flags = on ? 0 : GIB_INPUT_ABORT,
+    };
+    gib_vibration_output out;
+    int32_t status = gib_vibration_step(gib, &in, &out);
+    running = status == GIB_BUSY;
+    error = running || status == GIB_ERR_ABORTED ? 0 : status;
+    position = out.position_mm;
+    correction = out.correction_um;
+    blend = out.blend_ratio;
+    in_force = out.blend_ratio == 1.0;
+    state = out.phase;
+    why = out.reasons;
+}
+
+/* Nothing is in force, and something may be asked for. */
+__attribute__((noinline, cold)) static void ask(struct __comp_state *__comp_inst, long period)
+{
+    if (on && !asked) {
         error = begin(__comp_inst, period * 1e-9);
         running = error == GIB_OK;
     }
     asked = on;
-    position = safe;
-    correction = 0.0;
+    correction = blend = 0.0;
+    in_force = 0;
+}
+
+FUNCTION(_)
+{
+    int good = gib_hal_held(scale, &safe);
     if (running) {
-        gib_vibration_input in = {
-            .scale_mm = scale,
-            .angle_deg = angle,
-            .acceleration_m_s2 = {seat, bearing},
-            .flags = on ? 0 : GIB_INPUT_ABORT,
-        };
-        gib_vibration_output out;
-        int32_t status = gib_vibration_step(gib, &in, &out);
-        running = status == GIB_BUSY;
-        error = running || status == GIB_ERR_ABORTED ? 0 : status;
-        position = good ? out.position_mm : safe;
-        correction = out.correction_um;
-        blend = out.blend_ratio;
-        state = out.phase;
-        why = out.reasons;
+        work(__comp_inst);
+    } else if (on | asked) {
+        ask(__comp_inst, period);
     }
-    in_force = running && good && blend == 1.0;
+    if (!running || !good) {
+        position = safe;
+        in_force = 0;
+    }
     ok = ok_in && good;
 }

@@ -8,7 +8,7 @@ import re
 import sys
 from collections import defaultdict
 
-# Of motion-controller, that gib may take. Its aim is all of gib; vibration, which only some machines run, does not keep it yet.
+# Of motion-controller, that all of gib may take.
 SHARE = 0.15
 
 
@@ -49,25 +49,19 @@ def read(paths):
     return spent
 
 
-def judge(spent):
-    """Prints a table; whether gib stays within its share."""
+def judge(spent, what):
+    """Prints a table of a servo cycle in which `what`; whether gib stays within its share."""
     cycles = max((calls for (ob, _), (calls, _) in spent.items() if ob == "motmod.so"), default=0)
     if not cycles:
         return False
     per_cycle = {key: total / cycles for key, (calls, total) in spent.items() if calls > cycles / 2}
     motion = max(cost for (ob, _), cost in per_cycle.items() if ob == "motmod.so")
-    gib = vibration = 0.0
+    print(f"test: instructions in a servo cycle in which {what} ({cycles} cycles)")
+    gib = 0.0
     for (ob, function), cost in sorted(per_cycle.items(), key=lambda item: -item[1]):
         instances = spent[(ob, function)][0] / cycles
-        print(f"test: {cost:8.0f} instructions a servo cycle: {ob} {function}, {instances:.0f} of them")
+        print(f"test: {cost:8.0f} {ob} {function}, {instances:.0f} of them")
         if ob.startswith("gib_") and not ob.startswith("gib_sim"):
             gib += cost
-            vibration += cost if ob.startswith("gib_vibration") else 0.0
-    print(f"test: {gib:8.0f} all of gib, {gib / motion:.3f} of motion-controller ({cycles} cycles)")
-    gib -= vibration
-    print(f"test: {gib:8.0f} without vibration, {gib / motion:.3f} of motion-controller, {SHARE} allowed")
+    print(f"test: {gib:8.0f} all of gib, {gib / motion:.3f} of motion-controller, {SHARE} allowed")
     return 0 < gib <= SHARE * motion
-
-
-if __name__ == "__main__":
-    sys.exit(not judge(read(sys.argv[1:])))
