@@ -146,10 +146,7 @@ pub unsafe extern "C" fn gib_learning_step(
     // SAFETY: the caller promises each is NULL or valid.
     let (handle, input, output) = unsafe { (handle.as_mut(), input.as_ref(), output.as_mut()) };
     match (handle, input, output) {
-        (Some(handle), Some(input), Some(output)) if handle.alive == ALIVE => {
-            handle.machine.step(input, output);
-            output.status
-        }
+        (Some(handle), Some(input), Some(output)) if handle.alive == ALIVE => handle.machine.step(input, output),
         (handle, input, output) => misused(handle, input, output),
     }
 }

@@ -12,6 +12,7 @@
 
 mod evaluate;
 mod held;
+mod quick;
 
 use super::config::GIB_LEARNING_HARMONICS;
 use super::io::*;
@@ -22,6 +23,7 @@ use crate::cycle::backlash::io::GIB_INPUT_ABORT;
 use crate::cycle::turns::fold;
 use crate::cycle::vibration::harmonic::Harmonics;
 use crate::error::*;
+use quick::Usual;
 
 /// Where the machine is. Each comment says what ends the state; those that wait have `wait_s` as their deadline.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,6 +68,8 @@ pub struct Learning {
     rate: f64,
     /// An angle has been read.
     known: bool,
+    /// The cycles that are all alike.
+    usual: Usual,
     /// Turns and cycles in this phase; point or harmonic that is worked on.
     progress: f64,
     cycles: u64,
@@ -113,6 +117,7 @@ impl Default for Learning {
             angle: 0.0,
             rate: 0.0,
             known: false,
+            usual: Usual::NONE,
             progress: 0.0,
             cycles: 0,
             at: 0,
@@ -213,12 +218,23 @@ impl Learning {
         LearningReport { status: self.status(), ..self.report }
     }
 
-    /// One servo cycle.
+    /// One servo cycle; returns the status.
     #[inline(always)]
-    pub fn step(&mut self, input: &LearningInput, output: &mut LearningOutput) {
-        if !self.quick(input) {
-            self.careful(input);
+    pub fn step(&mut self, input: &LearningInput, output: &mut LearningOutput) -> i32 {
+        if self.quick(input, output) {
+            return self.usual.status();
         }
+        if self.phase == Phase::Idle && self.idle(input, output) {
+            return GIB_OK;
+        }
+        self.careful(input, output)
+    }
+
+    /// Any cycle, with all that can happen in one.
+    #[inline(never)]
+    fn careful(&mut self, input: &LearningInput, output: &mut LearningOutput) -> i32 {
+        self.settle_usual();
+        self.any(input);
         *output = LearningOutput {
             command_mm: self.command,
             correction_um: self.correction.into(),
@@ -230,52 +246,17 @@ impl Learning {
         if self.phase != Phase::Measure {
             self.explain(output);
         }
+        self.see_usual(input, output);
+        output.status
     }
 
-    /// A cycle in which all is well and only a point is read; else nothing is changed and it returns false.
-    #[inline(always)]
-    fn quick(&mut self, input: &LearningInput) -> bool {
-        let angle = fold(input.angle_deg * (1.0 / 360.0));
-        let turned = fold(angle - self.angle);
-        let left = (1e3 * (input.target_mm - input.detected_mm)) as f32;
-        let rate = (self.rate + SPEED_SHARE * (turned - self.rate) + FLUSH) - FLUSH;
-        let progress = self.progress + turned.abs();
-        let place = Place::of(angle, self.plan.points, self.plan.scale);
-        let table = &self.tables[self.front & 1];
-        let correction = place.read(table);
-        // Each comparison is false for what is no number.
-        let well = self.phase == Phase::Measure
-            && input.flags == 0
-            && self.presence == 1.0
-            && self.reasons == 0
-            && turned.abs() <= self.plan.turn_max
-            && left.abs() <= self.plan.deviation
-            && rate.abs() >= self.plan.rate_min
-            && progress < self.plan.measure
-            && (correction - self.correction).abs() <= self.plan.slope;
-        if !well {
-            return false;
-        }
-        (self.angle, self.rate, self.progress) = (angle, rate, progress);
-        self.cycles += 1;
-        self.gather(place, turned, left, input.target_mm);
-        self.correction = correction;
-        self.command = input.target_mm + 1e-3 * f64::from(correction);
-        true
-    }
-
-    #[inline(always)]
     fn gather(&mut self, place: Place, turned: f64, left: f32, target: f64) {
         if let Some(bin) = self.bins.get_mut(place.entry) {
-            let part = turned.abs() as f32;
-            bin.weight += part;
-            bin.deviation += part * ((left + 1e-10) - 1e-10);
-            bin.target = target;
+            bin.add((turned.abs() * self.plan.scale) as f32, left, target);
         }
     }
 
-    /// Any cycle, with all that can happen in one.
-    fn careful(&mut self, input: &LearningInput) {
+    fn any(&mut self, input: &LearningInput) {
         if !input.target_mm.is_finite() {
             return self.blind();
         }
@@ -435,6 +416,7 @@ impl Learning {
     }
 
     fn enter(&mut self, phase: Phase) {
+        self.settle_usual();
         self.phase = phase;
         (self.progress, self.cycles, self.at) = (0.0, 0, 0);
     }

@@ -14,6 +14,8 @@ pub struct Plan {
     pub points: usize,
     /// See `points`.
     pub scale: f64,
+    /// Points in a degree.
+    pub points_per_deg: f64,
     /// Harmonics, and pairs of them.
     pub harmonics: usize,
     /// See `harmonics`.
@@ -61,6 +63,7 @@ impl Plan {
         resume: false,
         points: 16,
         scale: 16.0,
+        points_per_deg: 16.0 / 360.0,
         harmonics: 1,
         pairs: 1,
         measure: 1.0,
@@ -107,6 +110,7 @@ impl Plan {
             resume: whole("resume\0", c.resume, 0.0, 0.0, 1.0)? != 0.0,
             points: points as usize,
             scale: points,
+            points_per_deg: points / 360.0,
             harmonics: harmonics as usize,
             pairs: (harmonics as usize).div_ceil(2),
             measure: whole("revolutions\0", c.revolutions, 2.0, 1.0, 64.0)?,

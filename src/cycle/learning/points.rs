@@ -11,15 +11,25 @@ const ROUNDING: f64 = 1.5 * (1u64 << 52) as f64;
 /// Of those bits, as many as an entry's number has.
 const LOWEST: usize = 2 * GIB_LEARNING_POINTS - 1;
 
-/// What was measured at a point: sums weighted by the part of a turn that each reading stands for.
+/// What was measured at a point: sums weighted by the turn that each reading stands for, in points.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Bin {
-    /// Turns.
+    /// Points turned.
     pub weight: f32,
-    /// Turns × µm.
+    /// Points × µm.
     pub deviation: f32,
     /// Last target, mm.
     pub target: f64,
+}
+
+impl Bin {
+    /// Adds a deviation, µm, that stands for a turn by `part` points.
+    #[inline(always)]
+    pub fn add(&mut self, part: f32, deviation: f32, target: f64) {
+        self.weight += part;
+        self.deviation += part * deviation;
+        self.target = target;
+    }
 }
 
 /// A correction at a point, µm, and its slope, µm per point.
@@ -48,10 +58,16 @@ impl Place {
     #[inline(always)]
     #[must_use]
     pub fn of(turns: f64, points: usize, scale: f64) -> Place {
-        let at = turns * scale;
-        let rounded = at + ROUNDING;
-        let entry = (rounded.to_bits() as usize).wrapping_add(points >> 1) & LOWEST;
-        Place { entry, beyond: (at - (rounded - ROUNDING)) as f32 }
+        let at = Place::at(turns * scale);
+        Place { entry: at.entry.wrapping_add(points >> 1) & LOWEST, ..at }
+    }
+
+    /// A number of points behind the first, if that is no more than there are.
+    #[inline(always)]
+    #[must_use]
+    pub fn at(points: f64) -> Place {
+        let rounded = points + ROUNDING;
+        Place { entry: rounded.to_bits() as u32 as usize, beyond: (points - (rounded - ROUNDING)) as f32 }
     }
 
     /// What a table says there.

@@ -9,7 +9,7 @@ use core::f64::consts::TAU;
 
 /// Updates that may grow in a row: by harmonics a trial teaches what the next one needs.
 const GROWN_MAX: u32 = 3;
-/// Turns below which nothing was measured.
+/// Points turned below which nothing was measured.
 const TURNS_MIN: f64 = 1e-3;
 
 impl Learning {
