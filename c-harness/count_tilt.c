@@ -16,7 +16,8 @@ static int32_t labelled_step(tilt_kernel *k, const gib_tilt_input *in)
     int phase = k->out.phase;
     CALLGRIND_ZERO_STATS;
     int32_t status = gib_tilt_step(k->gib, in, &k->out);
-    snprintf(label, sizeof label, "%s", PHASES[phase]);
+    int in_the_air = phase == GIB_TILT_MEASURING && !(in->flags & GIB_TILT_INPUT_CUTTING);
+    snprintf(label, sizeof label, "%s", in_the_air ? "in the air" : PHASES[phase]);
     CALLGRIND_DUMP_STATS_AT(label);
     return status;
 }

@@ -162,26 +162,9 @@ pub unsafe extern "C" fn gib_tilt_start(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn gib_tilt_step(handle: *mut GibTilt, input: *const TiltInput, output: *mut TiltOutput) -> i32 {
     // SAFETY: the caller promises each is NULL or valid.
-    let (mut handle, input, mut output) = unsafe { (handle.as_mut(), input.as_ref(), output.as_mut()) };
-    if let (Some(handle), Some(input), Some(output)) = (&mut handle, input, &mut output)
-        && handle.alive == ALIVE
-        && handle.machine.quick(input)
-    {
-        **output = *handle.machine.output();
-        return output.status;
-    }
-    in_full(handle, input, output)
-}
-
-/// A step that is not like the one before, or a call that was no step.
-#[inline(never)]
-fn in_full(handle: Option<&mut GibTilt>, input: Option<&TiltInput>, output: Option<&mut TiltOutput>) -> i32 {
+    let (handle, input, output) = unsafe { (handle.as_mut(), input.as_ref(), output.as_mut()) };
     match (handle, input, output) {
-        (Some(handle), Some(input), Some(output)) if handle.alive == ALIVE => {
-            handle.machine.step(input);
-            *output = *handle.machine.output();
-            output.status
-        }
+        (Some(handle), Some(input), Some(output)) if handle.alive == ALIVE => handle.machine.step(input, output),
         (handle, input, output) => misused(handle, input, output),
     }
 }

@@ -8,7 +8,7 @@ use std::fmt;
 use crate::cycle::tilt::config::{
     GIB_TILT_AC_CURRENT, GIB_TILT_DC_LOAD, GIB_TILT_FLAG, GIB_TILT_MEASURE_ONLY, GIB_TILT_TEACH, TiltConfig,
 };
-use crate::cycle::tilt::io::{GIB_TILT_INPUT_CUTTING, GIB_TILT_INPUT_END, TiltInput};
+use crate::cycle::tilt::io::{GIB_TILT_INPUT_CUTTING, GIB_TILT_INPUT_END, TiltInput, TiltOutput};
 use crate::cycle::tilt::machine::Tilt;
 use crate::cycle::tilt::plan::Plan;
 use crate::cycle::tilt::table::{TiltCondition, TiltTable};
@@ -120,10 +120,9 @@ fn run(recording: &Recording, options: &Options, table: Option<&TiltTable>) -> R
     });
     let mut tilt = Box::new(Tilt::default());
     tilt.start(plan).map_err(Error::Refused)?;
+    let mut output = TiltOutput::default();
     let mut step = |input: &TiltInput| {
-        if !tilt.quick(input) {
-            tilt.step(input);
-        }
+        tilt.step(input, &mut output);
         tilt.busy()
     };
     let mut last = TiltInput::default();

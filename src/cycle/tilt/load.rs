@@ -58,8 +58,13 @@ impl Collector {
 
     #[inline(always)]
     fn add(&mut self, plan: &Plan, input: &TiltInput, share: f64) {
-        let speed = input.speed_rpm.abs();
         self.cycles += share;
+        self.sum_up(plan, input, share);
+    }
+
+    #[inline(always)]
+    fn sum_up(&mut self, plan: &Plan, input: &TiltInput, share: f64) {
+        let speed = input.speed_rpm.abs();
         self.turns += share * (speed * plan.turns_per_rpm + plan.turns_per_cycle);
         self.sum += share * input.load * (plan.squared * input.load + plan.plain);
         self.position[0] += share * input.position_mm[0];
@@ -68,14 +73,34 @@ impl Collector {
     }
 
     /// Adds a cycle when the block goes on after it; else changes nothing.
-    #[inline(always)]
     pub fn quick(&mut self, plan: &Plan, input: &TiltInput) -> bool {
-        let turns = input.speed_rpm.abs() * plan.turns_per_rpm + plan.turns_per_cycle;
-        let goes_on = self.turns + turns < self.whole && self.cycles < self.longest;
+        let goes_on = self.cycles < self.longest && self.usual(plan, input);
         if goes_on {
-            self.add(plan, input, 1.0);
+            self.cycles += 1.0;
         }
         goes_on
+    }
+
+    /// The same for one of at most [`Collector::most_more`] cycles, which are to be counted afterwards.
+    #[inline(always)]
+    pub fn usual(&mut self, plan: &Plan, input: &TiltInput) -> bool {
+        let turns = input.speed_rpm.abs() * plan.turns_per_rpm + plan.turns_per_cycle;
+        let goes_on = self.turns + turns < self.whole;
+        if goes_on {
+            self.sum_up(plan, input, 1.0);
+        }
+        goes_on
+    }
+
+    /// Cycles that can follow before the block is given up.
+    #[must_use]
+    pub fn most_more(&self) -> u32 {
+        (self.longest - self.cycles) as u32
+    }
+
+    /// Counts usual cycles.
+    pub fn count(&mut self, cycles: u32) {
+        self.cycles += f64::from(cycles);
     }
 
     /// Adds the cycle that ends the block; gives the block and begins the next with what is left of the cycle. None for a

@@ -9,6 +9,8 @@
 //! `leave` is the one door out: it takes every offset out within the bounds of speed and acceleration. Until the operator
 //! has accepted the warning no offset is put out. Offsets in force end by `GIB_TILT_INPUT_OFF`, an abort or a fault.
 
+mod quick;
+
 use super::config::*;
 use super::fit::Fit;
 use super::follow::Follower;
@@ -20,6 +22,7 @@ use super::trace::Trace;
 use super::verdict::*;
 use crate::cycle::backlash::io::{GIB_INPUT_ABORT, GIB_INPUT_FAULT};
 use crate::error::*;
+use quick::Usual;
 
 /// Where the machine is. Each comment says what ends the state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,6 +67,10 @@ pub struct Tilt {
     cut_left: u32,
     air_left: u32,
     left: u32,
+    /// What the cycles are that are all alike, and for how many more they can be, of how many.
+    usual: Usual,
+    alike: u32,
+    granted: u32,
     /// The tool is in the cut, and `block` under way.
     cutting: bool,
     /// Something was cut: `start` holds where the path began, and the angles a b c there.
@@ -78,7 +85,9 @@ pub struct Tilt {
     plane: [f64; 3],
     /// x y z a b c.
     followers: [Follower; 6],
-    /// All but z rest on their targets, z is met and not limited.
+    /// All but z rest on their targets.
+    others_rest: bool,
+    /// So they do, z is met and not limited.
     settled: bool,
     report: TiltReport,
     output: TiltOutput,
@@ -94,6 +103,9 @@ impl Default for Tilt {
             cut_left: 0,
             air_left: 0,
             left: 0,
+            usual: Usual::Rest,
+            alike: 0,
+            granted: 0,
             cutting: false,
             begun: false,
             start: [0.0; 3],
@@ -104,6 +116,7 @@ impl Default for Tilt {
             offsets: Offsets::default(),
             plane: [0.0; 3],
             followers: [Follower::default(); 6],
+            others_rest: false,
             settled: false,
             report: TiltReport::default(),
             output: TiltOutput::default(),
@@ -138,7 +151,8 @@ impl Tilt {
         self.plan = plan?;
         self.fault = Fault::NONE;
         (self.cut_left, self.air_left) = (self.plan.time_limit, self.plan.time_limit);
-        (self.cutting, self.begun, self.settled) = (false, false, false);
+        (self.cutting, self.begun, self.settled, self.others_rest) = (false, false, false, false);
+        (self.alike, self.granted) = (0, 0);
         self.trace.clear([0.0; 2]);
         self.fit = Fit::REST;
         self.report = TiltReport::default();
@@ -179,34 +193,8 @@ impl Tilt {
         TiltReport { status: self.output.status, ..self.report }
     }
 
-    /// One servo cycle if it is like the one before, which most are; false when it is not, and nothing is done.
-    #[inline(always)]
-    pub fn quick(&mut self, input: &TiltInput) -> bool {
-        match self.phase {
-            Phase::Measuring => {
-                let goes_on = input.flags == GIB_TILT_INPUT_CUTTING && self.cutting && self.cut_left > 0;
-                let goes_on = goes_on && sound(input) && self.block.quick(&self.plan, input);
-                self.cut_left -= u32::from(goes_on);
-                goes_on
-            }
-            Phase::Active => {
-                // Comparisons with NaN are false.
-                let target = self.z_target(input);
-                let safe = input.flags & !GIB_TILT_INPUT_CUTTING == 0 && self.settled && sound(input);
-                let [_, _, z, ..] = &mut self.followers;
-                let met = safe && target.abs() <= self.plan.most_mm && z.meets(target, &self.plan.linear);
-                if met {
-                    self.output.offset_mm[2] = target;
-                }
-                met
-            }
-            Phase::Idle | Phase::Done | Phase::Failed => true,
-            _ => false,
-        }
-    }
-
-    /// One servo cycle that is not [`Tilt::quick`].
-    pub fn step(&mut self, input: &TiltInput) {
+    /// A cycle in which anything can happen.
+    fn any(&mut self, input: &TiltInput) {
         if !self.busy() {
             return;
         }
@@ -393,8 +381,15 @@ impl Tilt {
         let z = wanted.max(-most).min(most);
         let [x, y, _] = self.offsets.linear;
         self.output.limited = i32::from(z != wanted);
+        if self.others_rest && self.phase == Phase::Active {
+            let there = self.followers[2].step(z, &self.plan.linear);
+            self.output.offset_mm[2] = self.followers[2].value;
+            self.settled = there && z == wanted;
+            return there;
+        }
         let there = self.toward([x, y, z], self.offsets.angular);
         let rest = self.followers.iter().enumerate().all(|(i, follower)| i == 2 || follower.rests());
+        self.others_rest = there && rest;
         self.settled = there && rest && z == wanted;
         there && rest
     }
@@ -445,6 +440,7 @@ impl Tilt {
 
     fn enter(&mut self, phase: Phase) {
         self.phase = phase;
+        self.usual = Usual::None;
         self.output.warning = i32::from(phase == Phase::Warning);
         self.output.phase = match phase {
             Phase::Idle => GIB_TILT_IDLE,

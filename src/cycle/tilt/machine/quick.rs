@@ -1,0 +1,85 @@
+//! The usual cycle: in the cut within a block, or with the offsets in force and z following the path, or at rest.
+//!
+//! It does what any other cycle would do, without asking for all that can happen. After any other cycle that one says what
+//! the next can be, and in the cut for how many more.
+
+use super::*;
+
+/// What a usual cycle is now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Usual {
+    /// There is none.
+    None,
+    /// In the cut.
+    Cut,
+    /// With all offsets but z's at rest.
+    Active,
+    /// Not busy.
+    Rest,
+}
+
+impl Tilt {
+    /// One servo cycle; returns the status.
+    #[inline(always)]
+    pub fn step(&mut self, input: &TiltInput, output: &mut TiltOutput) -> i32 {
+        if self.quick(input) {
+            *output = self.output;
+            return output.status;
+        }
+        self.careful(input, output)
+    }
+
+    #[inline(never)]
+    fn careful(&mut self, input: &TiltInput, output: &mut TiltOutput) -> i32 {
+        // What usual cycles in the cut have put off.
+        let done = self.granted - self.alike;
+        self.cut_left -= done;
+        self.block.count(done);
+        (self.alike, self.granted) = (0, 0);
+        self.any(input);
+        self.see_usual();
+        *output = self.output;
+        output.status
+    }
+
+    /// Says what the next cycles can be.
+    fn see_usual(&mut self) {
+        self.usual = match self.phase {
+            Phase::Measuring if self.cutting => {
+                self.granted = self.block.most_more().min(self.cut_left);
+                self.alike = self.granted;
+                if self.granted > 0 { Usual::Cut } else { Usual::None }
+            }
+            Phase::Active if self.settled => Usual::Active,
+            Phase::Idle | Phase::Done | Phase::Failed => Usual::Rest,
+            _ => Usual::None,
+        };
+    }
+
+    /// Does this cycle if it is a usual one; else returns false with nothing changed.
+    #[inline(always)]
+    fn quick(&mut self, input: &TiltInput) -> bool {
+        if self.usual == Usual::Cut {
+            if input.flags != GIB_TILT_INPUT_CUTTING || !sound(input) || !self.block.usual(&self.plan, input) {
+                return false;
+            }
+            self.alike -= 1;
+            if self.alike == 0 {
+                self.usual = Usual::None;
+            }
+            true
+        } else if self.usual == Usual::Active {
+            // Comparisons with NaN are false.
+            let target = self.z_target(input);
+            let safe = input.flags & !GIB_TILT_INPUT_CUTTING == 0 && sound(input);
+            let [_, _, z, ..] = &mut self.followers;
+            let met = safe && target.abs() <= self.plan.most_mm && z.meets(target, &self.plan.linear);
+            if met {
+                self.output.offset_mm[2] = target;
+            }
+            met
+        } else {
+            self.usual == Usual::Rest
+        }
+    }
+}
