@@ -2452,7 +2452,7 @@ typedef struct gib_inertia_config {
      */
     int32_t torque_unit;
     /**
-     * Times up and down, 1 to 50 (default 2).
+     * Times up and down, 1 to 50 (default 2). There is room for some 20 short ramps up and down; of more, the first count.
      */
     int32_t ramps;
     /**

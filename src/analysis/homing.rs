@@ -111,7 +111,7 @@ pub fn contacts(recording: &Recording, options: &Options) -> Result<Found, Refus
     let ways: Vec<f64> = positions.iter().map(|x| sense * x).collect();
     let limit = options.limit.unwrap_or_else(|| pressed(&toward));
     let rows = touches(&ways, &toward, LIMITING * limit);
-    let shortest = rows.iter().map(|t| ways[t.end] - ways[t.from]).fold(f64::INFINITY, f64::min);
+    let shortest = rows.iter().map(|t| t.way(&ways)).fold(f64::INFINITY, f64::min);
     if rows.is_empty() || !(limit > 0.0 && shortest > 0.0) {
         return Err(Refusal::NoTouch);
     }
@@ -187,15 +187,24 @@ struct Rows {
 }
 
 impl Rows {
+    /// Way gone toward the stop.
+    fn way(&self, ways: &[f64]) -> f64 {
+        ways[self.end] - ways[self.from]
+    }
+
     /// The row from which the last `window` of the way begins.
     fn begin(&self, ways: &[f64], window: f64) -> usize {
         (self.from..self.end).find(|row| ways[*row] >= ways[self.end] - window).unwrap_or(self.from)
     }
 }
 
+/// The touches but those much shorter than the others: there the torque only dipped.
 fn touches(ways: &[f64], toward: &[f64], threshold: f64) -> Vec<Rows> {
-    let (mut found, mut filtered, mut pressing) = (Vec::new(), toward.first().copied().unwrap_or(0.0), false);
-    let mut furthest = 0;
+    const DIP: f64 = 0.3;
+    let mut found = Vec::new();
+    let mut filtered = toward.first().copied().unwrap_or(0.0);
+    // How an axis came to a stop that it stands on from the first row is not in the recording.
+    let (mut pressing, mut furthest) = (filtered >= threshold, 0);
     for (i, (way, torque)) in ways.iter().zip(toward).enumerate() {
         filtered += GAIN * (torque - filtered);
         if *way < ways[furthest] {
@@ -210,6 +219,8 @@ fn touches(ways: &[f64], toward: &[f64], threshold: f64) -> Vec<Rows> {
             furthest = i;
         }
     }
+    let usual = median(&found.iter().map(|touch: &Rows| touch.way(ways)).collect::<Vec<f64>>()).unwrap_or(0.0);
+    found.retain(|touch| touch.way(ways) > DIP * usual);
     found
 }
 
@@ -280,6 +291,17 @@ mod tests {
             assert!((mean.stiffness_nm_mm - 100.0).abs() < 3.0 && (mean.sliding_nm - 1.5).abs() < 0.05);
             assert!(sense * (mean.threshold_mm - mean.contact_mm) > 0.025);
         }
+    }
+
+    #[test]
+    fn a_recording_that_begins_on_the_stop_still_shows_the_other_touches() {
+        let whole = recording(1.0, 0.2);
+        let from = 1050; // amid the first press
+        let columns = whole.columns.iter().map(|c| Column::new(&c.name, c.values[from..].to_vec())).collect();
+        let recording = Recording::from_columns("r.csv", whole.time_s[from..].to_vec(), columns).unwrap();
+        let found = contacts(&recording, &options()).unwrap();
+        assert_eq!(found.touches.len(), 2);
+        assert!(1e3 * (found.mean.contact_mm - 6.0).abs() < found.mean.uncertainty_um);
     }
 
     #[test]

@@ -20,7 +20,7 @@ pub struct InertiaConfig {
     /// Unit of the torque input: `GIB_TORQUE_NM` (default), `GIB_TORQUE_PERMILLE` of `rated_torque_nm`, or
     /// `GIB_TORQUE_AMPERE` times `torque_constant_nm_a`.
     pub torque_unit: i32,
-    /// Times up and down, 1 to 50 (default 2).
+    /// Times up and down, 1 to 50 (default 2). There is room for some 20 short ramps up and down; of more, the first count.
     pub ramps: i32,
     /// Process step that the value will belong to, 0 for the whole program, to 9999. Given back in the report.
     pub process_step: i32,

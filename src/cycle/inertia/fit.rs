@@ -295,8 +295,8 @@ fn ramp(rows: &Rows, balance: &Balance, length: u32, question: &Question) -> Ram
     let span = 0.9 * top;
     let density = balance.scatter.powi(2) * f64::from(length) * question.sample_s / PARABOLA;
     let inertia = balance.inertia.value.abs().max(1e-3 * balance.inertia.uncertainty);
-    // A margin of a half: the noise is itself only estimated, and ripple hangs together longer than a block.
-    let wanted = question.target * inertia / (1.5 * student(100.0));
+    // Twice as sure as wanted: the noise is itself only estimated, and ripple hangs together longer than a block.
+    let wanted = question.target * inertia / (2.0 * student(100.0));
     let needed = density / (2.0 * span * wanted * wanted);
     // No slower than a quarter of what was seen, no faster than the torque seen allows.
     let seen = quantile(rows.blocks, 0.98, |b| b.acceleration.abs());

@@ -41,6 +41,9 @@ pub struct Plan {
 
 /// Blocks that a ramp is cut into where the room allows it: enough to see scatter, long enough to calm it.
 const BLOCKS_PER_RAMP: u32 = 24;
+/// Fewest where it does not: with fewer, the corners of the ramps cannot be told from noise. Of more ramps than have room then
+/// the first count.
+const FEWEST_PER_RAMP: u32 = 8;
 /// Blocks that a whole measurement is planned to fill; the rest is room for what starts late.
 const PLANNED: u32 = BLOCKS as u32 * 4 / 5;
 
@@ -130,7 +133,8 @@ impl Plan {
         self.acceleration = acceleration * cycle;
         self.ramp = self.cycles_between(low, top);
         self.hold = (hold / cycle + 0.5) as u32;
-        self.block = (self.ramp / BLOCKS_PER_RAMP).max(self.gathering() / PLANNED).max(4);
+        let roomy = (self.gathering() / PLANNED).min(self.ramp / FEWEST_PER_RAMP);
+        self.block = (self.ramp / BLOCKS_PER_RAMP).max(roomy).max(4);
         Ok(())
     }
 
@@ -197,11 +201,13 @@ mod tests {
     }
 
     #[test]
-    fn every_measurement_fits_into_its_blocks() {
+    fn every_measurement_fits_into_its_blocks_or_has_enough_of_each_ramp() {
         for (high, acceleration, ramps) in [(2000.0, 1500.0, 2), (12000.0, 25.0, 50), (300.0, 1000.0, 50)] {
             let config = InertiaConfig { speed_high_rpm: high, acceleration_rpm_s: acceleration, ramps, ..valid() };
             let plan = Plan::new(&config).unwrap();
-            assert!(plan.gathering() / plan.block <= BLOCKS as u32, "{plan:?}");
+            let (blocks, in_ramp) = (plan.gathering() / plan.block, plan.ramp / plan.block);
+            assert!(blocks <= BLOCKS as u32 || in_ramp == FEWEST_PER_RAMP, "{plan:?}");
+            assert!(in_ramp >= FEWEST_PER_RAMP, "{plan:?}");
         }
     }
 }
