@@ -18,7 +18,7 @@ RELEASE := $(TARGET)/$(PROFILE)
 # What a C program outside the tree would find installed: the libraries with their links.
 LIB := build/lib
 
-.PHONY: all build header demo test deps check-format check-lints test-rust test-harness linuxcnc-test bench scoreboard install uninstall clean help
+.PHONY: all build header demo test deps check-format check-lints test-rust test-parquet test-harness linuxcnc-test bench scoreboard install uninstall clean help
 
 all: build
 
@@ -58,6 +58,9 @@ check-lints:
 
 test-rust:
 	GIB_RELEASE=$(RELEASE) $(CARGO) test
+
+test-parquet: ## the feature parquet, which takes minutes to build and is not in `make test`
+	$(CARGO) test --features parquet --lib -- parquet
 
 test-harness:
 	@if [ -e c-harness/Makefile ]; then $(MAKE) -C c-harness test; else echo "test-harness: skipped, no c-harness/Makefile"; fi
