@@ -44,6 +44,9 @@ param rw float distance_max = 100 "largest way toward the stop, mm";
 param rw float zero_offset = 1 "way from the contact point to where the axis stands when homed, mm";
 param rw float retract = 0 "way back from the stop between touches, mm";
 param rw s32 touch_count = 0 "measured touches";
+param rw s32 home_method = 0 "home is: 0 where the torque line starts, 1 where the torque limit is reached (as published)";
+param rw bit torque_turned = 0 "true: the drive's torque is negative toward positive positions";
+param rw float distance_least = 0 "smallest way toward the stop, mm: a stop before it is a fault";
 param rw float time_limit = 0 "time for the whole homing, s";
 
 variable gib_homing *gib;
@@ -97,6 +100,9 @@ static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
     config.zero_offset_mm = zero_offset;
     config.retract_mm = retract;
     config.touches = touch_count;
+    config.method = home_method;
+    config.torque_inverted = torque_turned;
+    config.distance_min_mm = distance_least;
     config.time_limit_s = time_limit;
     return gib_homing_start(gib, &config);
 }
