@@ -81,6 +81,8 @@ pub struct Calibration {
     /// Cycles of the present block, and of its phase.
     cycle: u32,
     phase_turns: f64,
+    /// cos and sin of that phase: what is read next answers what was commanded last.
+    wheel: (f64, f64),
     block: u32,
     /// Seat, bearing, ball bar, torque.
     detectors: [Detector; 4],
@@ -105,6 +107,7 @@ impl Default for Calibration {
             probes: 0,
             cycle: 0,
             phase_turns: 0.0,
+            wheel: (1.0, 0.0),
             block: 0,
             detectors: [Detector::default(); 4],
             output: CalibrationOutput::default(),
@@ -269,7 +272,7 @@ impl Calibration {
     /// A cycle of a block: this input answers the command of the phase that was put out last.
     #[inline(always)]
     fn read(&mut self, input: &CalibrationInput) {
-        let (cos, sin) = cos_sin(self.phase_turns);
+        let (cos, sin) = self.wheel;
         let [a1, a2] = input.acceleration_m_s2;
         let begins = self.cycle == 0 && self.block == 0;
         for (detector, reading) in self.detectors.iter_mut().zip([a1, a2, input.ball_bar_um, input.torque]) {
@@ -345,14 +348,29 @@ impl Calibration {
             self.tune();
         } else {
             self.point = 0;
-            self.table = CalibrationTable::default();
+            self.table.count = 0;
             self.enter(Phase::Evaluate);
         }
     }
 
-    /// One frequency a cycle.
+    /// One frequency a cycle; then one cycle for each entry of the table that holds none.
     fn evaluate(&mut self) {
         let i = self.point & (GIB_CALIBRATION_POINTS - 1);
+        self.point += 1;
+        if i < self.plan.count {
+            self.find_gains(i);
+        } else {
+            self.table.point[i] = CalibrationPoint::default();
+        }
+        if self.phase == Phase::Evaluate && self.point == GIB_CALIBRATION_POINTS {
+            self.table.count = self.plan.count as u32;
+            self.count += 1;
+            self.point = 0;
+            self.enter(Phase::Done);
+        }
+    }
+
+    fn find_gains(&mut self, i: usize) {
         let experiments = self.experiments[i].get(..=self.count).unwrap_or(&self.experiments[i]);
         let last = experiments.last().copied().unwrap_or_default();
         let found =
@@ -367,13 +385,6 @@ impl Calibration {
         }
         let used = if self.plan.published { 1.0 } else { experiments.len() as f64 };
         self.table.point[i] = point(self.plan.tone(i).frequency, &found, last.amplitude, used);
-        self.point += 1;
-        if self.point == self.plan.count {
-            self.table.count = self.plan.count as u32;
-            self.count += 1;
-            self.point = 0;
-            self.enter(Phase::Done);
-        }
     }
 
     /// A measurement that is worth nothing, with the frequency at which it is.
@@ -406,13 +417,16 @@ impl Calibration {
     /// Puts the command out.
     #[inline(always)]
     fn command(&mut self) {
-        let tone = self.plan.tone(self.point);
-        let (cos, sin) = cos_sin(self.phase_turns);
+        // Evaluation goes on behind the last frequency.
+        let point = self.point.min(self.plan.count.saturating_sub(1));
+        let tone = self.plan.tone(point);
+        self.wheel = cos_sin(self.phase_turns);
+        let (cos, sin) = self.wheel;
         self.output.target_position_mm = self.start + self.amplitude * sin;
         self.output.target_speed_mm_s = self.amplitude * tone.omega() * cos;
         self.output.frequency_hz = tone.frequency;
         self.output.amplitude_mm = self.amplitude;
-        self.output.point = self.point as i32;
+        self.output.point = point as i32;
     }
 
     fn enter(&mut self, phase: Phase) {
