@@ -24,6 +24,10 @@ pins = hal.component("gib-test")
 pins.ready()
 
 
+# What a test changes of the plant, as it was.
+MACHINE = {}
+
+
 def pin(name):
     return hal.get_value(name)
 
@@ -100,6 +104,14 @@ def lost_motion(joint):
     return 1e3 * (pin(of + "clearance") + 2 * on_table / pin(of + "stiffness"))
 
 
+def slides_freely(wanted):
+    """Takes friction and clearance from x, or gives them back: a slide that sticks cannot follow some micrometres."""
+    for name in ("clearance", "friction"):
+        place = "gib-sim-axis.0." + name
+        MACHINE.setdefault(place, pin(place))
+        hal.set_p(place, "0" if wanted else str(MACHINE[place]))
+
+
 def counted_for(seconds):
     """{(object, function): (calls, instructions)} of the servo thread, from now on."""
     rtapi = subprocess.run(["pgrep", "-f", "bin/rtapi_counted"], capture_output=True, text=True, check=True).stdout.split()[0]
@@ -114,7 +126,7 @@ def counted_for(seconds):
 
 def counted():
     """Instructions of each function of the servo thread, while all axes move: at a speed that varies, and at a steady one
-    with the swing of the tool corrected and its undoing learnt. Who wants one of the two does not want the other."""
+    with the swing of the tool corrected and what was learnt against it in force. Who wants one does not want the other."""
     machine_on()
     home_all()
     mdi("M68 E0 Q0.5")
@@ -128,13 +140,14 @@ def counted():
     mdi("M114")
     hal.set_p("gib-vibration.0.on", "1")
     wait(lambda: pin("gib-vibration.0.in-force"), 30, "the correction is in force")
+    slides_freely(True)
     hal.set_p("gib-learning.0.on", "1")
+    wait(lambda: pin("gib-learning.0.done"), 60, "the swing is undone")
     command.mdi("G1 X30 Y30 Z30 F200")
     time.sleep(1)
-    check(pin("gib-learning.0.busy"), "the command is being learnt")
     swinging = counted_for(5)
     within = [cost.judge(spent, what) for spent, what in
-              ((varying, "the speed varies"), (swinging, "the swing is corrected and learnt"))]
+              ((varying, "the speed varies"), (swinging, "the swing is corrected and undone"))]
     check(all(within), "gib within its share of motion-controller")
 
 
@@ -457,10 +470,7 @@ def vibration_corrected():
 
 def swing_learnt():
     """A slide without friction is told where to be so that the tool stands still against the workpiece."""
-    of = "gib-sim-axis.0."
-    kept = {name: pin(of + name) for name in ("clearance", "friction")}
-    for name in kept:
-        hal.set_p(of + name, "0")
+    slides_freely(True)
     mdi("G0 X30")
 
     def swing():
@@ -481,8 +491,7 @@ def swing_learnt():
     mdi("M120 P0")
     check(pin("gib-learning.0.correction") == 0 and not pin("gib-learning.0.busy"), "M120 P0 takes it out again")
     mdi("M5")
-    for name, value in kept.items():
-        hal.set_p(of + name, str(value))
+    slides_freely(False)
 
 
 TESTS = [homing, refused, inertia_and_variation, lost_motion_measured, abort_restores, put_back, diagnosed,
