@@ -54,6 +54,8 @@ enum Phase {
 
 /// Share of a cycle's turn in the speed that says whether the spindle turns.
 const SPEED_SHARE: f64 = 0.05;
+/// Points that a cycle empties.
+const EMPTIED: usize = 8;
 /// Added and taken away, this leaves nothing that could become subnormal.
 const FLUSH: f64 = 1e-12;
 
@@ -332,7 +334,7 @@ impl Learning {
     }
 
     fn settle(&mut self, turned: f64) {
-        if let Some(bin) = self.bins.get_mut(self.at) {
+        for bin in self.bins.iter_mut().skip(self.at).take(EMPTIED) {
             *bin = Bin::default();
             self.at += 1;
         }

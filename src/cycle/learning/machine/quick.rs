@@ -1,4 +1,4 @@
-//! The usual cycle: a point is read while all goes on as before, or the correction that was learnt is kept in force.
+//! The usual cycle: all goes on as before, the correction in force is kept, and while measuring a point is read.
 //!
 //! It does what `careful` would do, without asking for all that can happen. After any other cycle that one says for how many
 //! cycles more nothing ends, and what is put off until then: angles less whole turns, the measured speed, what has turned.
@@ -57,6 +57,7 @@ impl Learning {
         let rate = self.rate.abs() * (1.0 + PACE);
         let steady = self.rate.abs() * (1.0 - PACE) > self.plan.rate_min && rate <= self.plan.turn_max;
         let cycles = match self.phase {
+            Phase::Settle if self.at > self.plan.points => (self.plan.settle - self.progress) / rate - 1.0,
             Phase::Measure => (self.plan.measure - self.progress) / rate - 1.0,
             Phase::Done => MOST,
             _ => 0.0,
