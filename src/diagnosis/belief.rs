@@ -1,14 +1,6 @@
-//! What the belief already explains is taken off the recording before anything is looked for, and what is found joins it.
-//!
-//! Base values of the belief (inertia, friction, constant torque) are regressors of the balance. Clearance and spring are
-//! simulated as they are when they are looked for, so that what was found leaves nothing when it is believed. The other
-//! effects are predicted, T(belief) − T(base alone), so that a machine file explains in a diagnosis just what it explains
-//! in `gib predict`.
+//! What of a belief stays open to be found, and how what is found joins it.
 
-use super::causes::{Trace, table_side};
-use super::frame::{Columns, Frame};
 use crate::machine::{Axis, Cause, Effect};
-use crate::plant::predict::predict_torque;
 use std::f64::consts::TAU;
 
 /// Whether an effect of the belief is one of its base values or its timing, which the balance itself takes care of.
@@ -23,52 +15,11 @@ fn in_the_balance(effect: &Effect) -> bool {
     )
 }
 
-fn sets_the_table_apart(effect: &Effect) -> bool {
-    matches!(effect.cause(), Cause::Backlash | Cause::DriveCompliance)
-}
-
 /// The axis with its belief as base values and nothing else but the timing.
 #[must_use]
 pub fn base_alone(axis: &Axis) -> Axis {
     let timing = axis.effects.iter().copied().filter(|e| e.cause() == Cause::DeadTime).collect();
     Axis { base: axis.belief(), ..axis.with_effects(timing) }
-}
-
-/// Takes off the columns what the effects of the belief add to its base values on a rigid axis; the rest is in [`trace`].
-///
-/// # Errors
-/// The effects contradict the inertia, as [`Axis::two_masses`].
-pub fn take_off(axis: &Axis, columns: &mut Columns) -> Result<(), String> {
-    axis.two_masses()?;
-    let rigid: Vec<Effect> = axis.effects.iter().copied().filter(|e| !sets_the_table_apart(e)).collect();
-    if rigid.iter().all(in_the_balance) {
-        return Ok(());
-    }
-    let Some(observed) = columns.observed() else { return Ok(()) };
-    let all = predict_torque(&axis.with_effects(rigid), &observed)?;
-    let base = predict_torque(&base_alone(axis), &observed)?;
-    for ((measured, all), base) in columns.torque.iter_mut().zip(&all.torque).zip(&base.torque) {
-        let known = all - base;
-        *measured -= if known.is_finite() { known } else { 0.0 };
-    }
-    if let Some(table) = &mut columns.table {
-        for (table, x) in table.iter_mut().zip(&columns.position) {
-            let known = all.physics.table_of(*x) - x - all.physics.table_zero;
-            *table -= if known.is_finite() { known } else { 0.0 };
-        }
-    }
-    Ok(())
-}
-
-/// What the belief expects at the judged rows: its base torque, and what clearance and spring add to it.
-#[must_use]
-pub fn trace(axis: &Axis, frame: &Frame) -> Trace {
-    let mut sum = Trace::torque(frame.believed());
-    if let Some(apart) = table_side::believed(frame, axis) {
-        sum.torque.iter_mut().zip(&apart.torque).for_each(|(sum, torque)| *sum += torque);
-        sum.table = apart.table;
-    }
-    sum
 }
 
 /// Whether a cause can be found beside what the belief has of it: it may be there more than once, replaces the believed

@@ -22,6 +22,8 @@ pub struct Bench<'f, 'a> {
     pub measured: Vec<f64>,
     /// Noise floors of torque and table − encoder at the judged rows, first guess.
     pub floors: [f64; 2],
+    /// Sum of squares, scaled, of what the belief's effects add to its base values.
+    pub known: f64,
     /// Judged rows of the torque; those of the table follow.
     pub rows: usize,
     /// Orthonormal columns that are free in every fit: the zero of the table's scale.
@@ -69,6 +71,7 @@ impl<'f, 'a> Bench<'f, 'a> {
         let mut table = frame.table_error();
         table.iter_mut().zip(&base.table).for_each(|(t, b)| *t -= b);
         let rows = torque.len();
+        let effects: Vec<f64> = base.torque.iter().zip(frame.believed()).map(|(all, base)| all - base).collect();
         let floors = [frame.floor(&torque, true), if table.is_empty() { 1.0 } else { frame.floor(&table, false) }];
         let measured: Vec<f64> = torque
             .iter()
@@ -82,7 +85,10 @@ impl<'f, 'a> Bench<'f, 'a> {
             level[rows..].fill(1.0 / (table.len() as f64).sqrt());
             free.push(level);
         }
-        Self { frame, measured, floors, rows, free }
+        let mut bench = Self { frame, measured, floors, known: 0.0, rows, free };
+        let effects = bench.stack(&Trace { torque: effects, table: base.table.clone() });
+        bench.known = dot(&effects, &effects);
+        bench
     }
 
     fn stack(&self, trace: &Trace) -> Vec<f64> {

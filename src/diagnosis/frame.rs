@@ -40,6 +40,9 @@ pub struct Columns {
 const MOST_KEPT: usize = 12_000;
 /// Rows of less weight are not judged: nothing is known of their friction.
 const LEAST_WEIGHT: f64 = 0.05;
+/// Share of the top speed at which an axis creeps: what dry friction does there depends on the formulation (a step, bristles,
+/// a steep slope), and no feed is so slow.
+const CREEPING: f64 = 1e-3;
 /// Contiguous blocks for held-out judgement.
 const BLOCKS: usize = 24;
 
@@ -117,7 +120,10 @@ impl<'a> Frame<'a> {
         let low_pass_kernel = low_pass.kernel();
         let kernel = convolve(&low_pass_kernel, &NUMEROV);
         let torque_kernel = convolve(&low_pass_kernel, &sampling.weights);
-        let doubt = low_pass.run(&doubtful_rows(columns, resting, resolution), stretches);
+        let mut doubt = doubtful_rows(columns, resting, resolution);
+        let creeping = CREEPING * v.iter().fold(0.0f64, |m, v| m.max(v.abs())).max(1e-300);
+        doubt.iter_mut().zip(&v).for_each(|(doubt, v)| *doubt = doubt.max((-(v / creeping).powi(2)).exp()));
+        let doubt = low_pass.run(&doubt, stretches);
         let level = belief.coulomb.max(1e-3 * typical(&columns.torque)) / torque_noise.max(1e-300);
         let kernel_norm = norm(&low_pass_kernel);
         // What torque and acceleration do between rows is not known: a straight line is off by a twelfth of the second

@@ -17,6 +17,7 @@ pub mod fit;
 pub mod frame;
 pub mod gain;
 mod json;
+mod known;
 pub mod progress;
 pub mod sampling;
 pub mod select;

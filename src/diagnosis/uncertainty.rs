@@ -11,6 +11,9 @@ use super::fit::{Bench, Fit, Part, Slope, dot};
 use crate::machine::Effect;
 use nalgebra::{DMatrix, DVector};
 
+/// How exactly a law holds, as a share of its size: sampling, filter and the law itself are no better.
+const LAW_HOLDS: f64 = 1e-3;
+
 /// Unknowns of a fit, as columns of its equations: coefficients of all parts in order, then the non-linear parameters.
 struct Unknowns<'s> {
     columns: Vec<&'s [f64]>,
@@ -106,7 +109,12 @@ pub fn effects(bench: &Bench, fit: &Fit) -> Vec<Option<(Effect, Vec<f64>)>> {
                 differ(first_slope + s, step / rate, effect_of(&shape, &fit.coefficients[i]));
             }
             let widened = if part.law.simulated { misfit } else { 1.0 };
-            let deviation = |k| widened * spread.deviation(&gradient.row(k).transpose());
+            let own = coefficient_at[i]..coefficient_at[i] + fit.coefficients[i].len();
+            let deviation = |k: usize| {
+                let size =
+                    own.clone().zip(&fit.coefficients[i]).map(|(u, c)| (gradient[(k, u)] * c).powi(2)).sum::<f64>();
+                (widened * spread.deviation(&gradient.row(k).transpose())).hypot(LAW_HOLDS * size.sqrt())
+            };
             let deviations = (0..values.len()).map(deviation).collect();
             Some((effect, deviations))
         })

@@ -10,6 +10,7 @@ use super::experiment;
 use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
 use super::gain::{self, Gain};
+use super::known;
 use super::progress::{Progress, Stopped, Watch};
 use super::select::{Selection, select};
 use super::show::{self, View};
@@ -112,11 +113,10 @@ pub fn diagnose(
         Err(why) => return Ok(insufficient(axis, vec![why.to_string()])),
     };
     let mut notes = whole.note();
-    let mut columns = whole.clone();
-    if let Err(why) = belief::take_off(axis, &mut columns) {
+    if let Err(why) = axis.two_masses() {
         return Ok(insufficient(axis, vec![format!("a machine file that holds together: {why}")]));
     }
-    let columns = columns.thinned();
+    let columns = whole.clone().thinned();
     let base = belief::base_alone(axis);
     let frame = Frame::new(&base, &columns, None);
     let missing = what_is_missing(&frame);
@@ -124,7 +124,7 @@ pub fn diagnose(
         return Ok(insufficient(axis, missing));
     }
     watch.at(0.05, "reading the motion")?;
-    let bench = Bench::new(&frame, &belief::trace(axis, &frame));
+    let bench = Bench::new(&frame, &known::trace(axis, &frame));
     let empty = bench.fit(Vec::new());
     let laws: Vec<&'static Law> = LAWS.iter().copied().filter(|law| belief::may_be_found(axis, law.cause)).collect();
     let selection = select(&bench, &laws, &watch)?;

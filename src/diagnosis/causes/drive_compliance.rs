@@ -15,7 +15,7 @@ pub static LAW: Law = Law {
         Scale::Log(3.0, 2000.0),
         Scale::Linear(0.04, 0.5, 0.01),
         Scale::Linear(0.02, 0.98, 0.02),
-        Scale::Log(2e-3, 0.6),
+        Scale::Log(2e-3, 0.3),
     ],
     starts: |frame, _| {
         // Behind a motor that moves as measured the table swings at its own frequency √(k/J₂), within a band of twice the

@@ -38,8 +38,8 @@ fn terms_of(frame: &Frame, splits: &[Option<TwoMasses>]) -> Vec<Term> {
 const SWING_S: f64 = 4e-3;
 /// Tables that are simulated side by side: each step waits for the one before it, so that several cost little more than one.
 const LANES: usize = 8;
-/// Radians of the fastest swing to a step.
-const STEP_RAD: f64 = 0.35;
+/// Radians of the fastest swing to a step: of a spring, whose swing is all that there is, and of flanks.
+const STEP_RAD: [f64; 2] = [0.12, 0.35];
 
 type Lanes = [f64; LANES];
 
@@ -85,8 +85,10 @@ impl<'a> Tables<'a> {
         let of = |value: fn(&TwoMasses) -> f64| lanes(|l| masses.get(l).or(masses.last()).map_or(1.0, value));
         let share = of(|m| m.table_friction_share);
         let fastest = masses.iter().map(|m| (m.stiffness / m.table_inertia).sqrt().max(m.damping / m.table_inertia));
-        let steps = (frame.columns.period_s * fastest.fold(0.0, f64::max) / STEP_RAD).ceil().clamp(1.0, 1000.0);
-        let (flanks, h) = (masses.iter().any(|m| m.clearance > 0.0), frame.columns.period_s / steps);
+        let flanks = masses.iter().any(|m| m.clearance > 0.0);
+        let radians = frame.columns.period_s * fastest.fold(0.0, f64::max);
+        let steps = (radians / STEP_RAD[usize::from(flanks)]).ceil().clamp(1.0, 1000.0);
+        let h = frame.columns.period_s / steps;
         // In steps of h a spring swings at ω when it is softer by (sin(ωh/2)/(ωh/2))² (leapfrog integration).
         let swing = of(|m| (m.stiffness / m.table_inertia).sqrt()).map(|omega| (0.5 * h * omega).clamp(1e-9, 1.0));
         let softer = swing.map(|half| (half.sin() / half).powi(2));
