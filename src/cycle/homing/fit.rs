@@ -86,6 +86,8 @@ pub struct Contact {
     pub stiffness_error: f64,
     /// Standard deviation of a block about level and line.
     pub noise: f64,
+    /// Way that a torque which swings before contact, as of an axis that sticks and slips, may hide.
+    pub swing: f64,
     /// Way from contact to where the torque limit was reached.
     pub press: f64,
     /// Way at which the plain threshold was reached.
@@ -125,6 +127,9 @@ pub struct Fit {
     /// From block to block of the line, and its last block.
     steps: Sums,
     before: Option<(f64, f64)>,
+    /// Squares from block to block of the level, and its last block.
+    level_steps: f64,
+    level_before: Option<(f64, f64)>,
     least: f64,
     split: Contact,
     found: Option<Contact>,
@@ -147,6 +152,8 @@ impl Default for Fit {
             line: Sums::default(),
             steps: Sums::default(),
             before: None,
+            level_steps: 0.0,
+            level_before: None,
             least: f64::INFINITY,
             split: Contact::default(),
             found: None,
@@ -249,6 +256,10 @@ impl Fit {
         let length = self.split.press;
         if along < -LEVEL_GAP * length {
             self.level.add(1.0, block);
+            if let Some((_, t)) = self.level_before {
+                self.level_steps += (block.1 - t) * (block.1 - t);
+            }
+            self.level_before = Some(block);
         } else if along >= LINE_FROM * length && along <= LINE_TO * length {
             self.line.add(1.0, block);
             if let Some((x, t)) = self.before {
@@ -290,6 +301,15 @@ impl Fit {
         (1.0 + rho) / (1.0 - rho)
     }
 
+    /// Peak of the torque's swing before contact: what the level scatters more than its noise from block to block, beyond chance.
+    fn swing(&self) -> f64 {
+        const PEAK: f64 = 1.5;
+        let n = self.level.n;
+        let noise = self.level_steps / (2.0 * (n - 1.0));
+        let beyond = self.level.scatter() / (n - 1.0) - (1.0 + 3.0 * (3.0 / n).sqrt()) * noise;
+        PEAK * beyond.max(0.0).sqrt()
+    }
+
     /// Contact point and its variance from the refined sums; `None` for a curve that is not a level and a line.
     fn solve(&self) -> Option<Contact> {
         /// Standard errors by which the slope must be above zero.
@@ -319,6 +339,7 @@ impl Fit {
             stiffness: slope,
             stiffness_error: slope_error,
             noise: scatter.sqrt(),
+            swing: self.swing() / slope,
             press: (self.threshold - torque) / slope,
             threshold_way: self.last,
         };

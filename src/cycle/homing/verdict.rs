@@ -1,7 +1,7 @@
 //! From single touches to a home position: do they agree, how sure is it, and what is reported.
 //!
 //! The variance of the mean is what the fits expect and what the touches show, added, since few touches show little; and
-//! what all touches have in common: the axis does not take the stop's force the very moment it meets it.
+//! what all touches have in common: the axis does not take the stop's force the very moment it meets it, and may have swung.
 
 use super::fit::{Contact, Fit};
 use super::plan::Plan;
@@ -124,6 +124,7 @@ impl Touches {
         self.mean.stiffness += contact.stiffness;
         self.mean.level += contact.level;
         self.mean.noise += contact.noise;
+        self.mean.swing += contact.swing;
         Ok(())
     }
 
@@ -139,6 +140,11 @@ impl Touches {
         self.threshold / self.n.max(1.0)
     }
 
+    /// Way that a torque which swings before contact may hide, mean of the measured touches.
+    fn swing(&self) -> f64 {
+        self.mean.swing / self.n.max(1.0)
+    }
+
     /// Standard deviation of the mean.
     fn deviation(&self, plan: &Plan) -> f64 {
         /// Time in s, as a standard deviation, by which torque and position of an impact differ: current loop, instant of
@@ -148,13 +154,14 @@ impl Touches {
         let expected = self.variances / n;
         let shown = (self.squares - self.sum * self.sum / n).max(0.0) / (n - 1.0).max(1.0);
         let impact = IMPACT_S * plan.touch * plan.cycles_per_s;
-        ((expected + shown) / n + impact * impact).sqrt()
+        let swing = self.swing();
+        ((expected + shown) / n + impact * impact + swing * swing).sqrt()
     }
 
     /// Whether the touches agree: a chip, a tight spot or a slipping encoder does not repeat.
     ///
     /// # Errors
-    /// `GIB_ERR_HOMING_TOUCHES` with the difference in µm.
+    /// `GIB_ERR_HOMING_TOUCHES` with the difference in µm; `GIB_ERR_HOMING_NOISE` with what a swinging torque may hide.
     pub fn agree(&self, plan: &Plan) -> Result<(), Fault> {
         // A single touch may be off by three of its standard deviations, two of them in opposite senses.
         let own = 3.0 * (2.0 * self.variances / self.n.max(1.0)).sqrt();
@@ -164,11 +171,17 @@ impl Touches {
         let square = if self.coarse { square } else { f64::INFINITY };
         let from_first = ((self.contact() - self.first).abs() - square) * (plan.touch / plan.approach);
         let difference = (self.most - self.least).max(from_first);
-        if difference <= allowed {
-            return Ok(());
+        let field = "touch_tolerance_um\0";
+        if !(difference <= allowed) {
+            let (code, value) = (GIB_ERR_HOMING_TOUCHES, 1e3 * difference);
+            return Err(Fault { code, field, value, low: 0.0, high: 1e3 * allowed });
         }
-        let (code, field) = (GIB_ERR_HOMING_TOUCHES, "touch_tolerance_um\0");
-        Err(Fault { code, field, value: 1e3 * difference, low: 0.0, high: 1e3 * allowed })
+        let swing = 2.0 * self.swing();
+        if !(swing <= plan.tolerance) {
+            let (code, value, high) = (GIB_ERR_HOMING_NOISE, 1e3 * swing, 1e3 * plan.tolerance);
+            return Err(Fault { code, field, value, low: 0.0, high });
+        }
+        Ok(())
     }
 
     /// Torque before contact, mean of the measured touches, in the unit of the input.
