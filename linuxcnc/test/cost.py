@@ -5,7 +5,6 @@ A thread's loop in hal_lib.so calls every function that was added to it. callgri
 Names are compressed: `(7) name` where it first stands, `(7)` after that.
 """
 import re
-import sys
 from collections import defaultdict
 
 # Of motion-controller, that all of gib may take.

@@ -22,8 +22,8 @@ pub struct Bench<'f, 'a> {
     pub measured: Vec<f64>,
     /// Noise floors of torque and table − encoder at the judged rows, first guess.
     pub floors: [f64; 2],
-    /// Sum of squares, scaled, of what the belief's effects add to its base values.
-    pub known: f64,
+    /// Mean square, scaled, of what the belief's effects add to its base values; a channel each.
+    pub known: Vec<f64>,
     /// Judged rows of the torque; those of the table follow.
     pub rows: usize,
     /// Orthonormal columns that are free in every fit: the zero of the table's scale.
@@ -85,9 +85,9 @@ impl<'f, 'a> Bench<'f, 'a> {
             level[rows..].fill(1.0 / (table.len() as f64).sqrt());
             free.push(level);
         }
-        let mut bench = Self { frame, measured, floors, known: 0.0, rows, free };
+        let mut bench = Self { frame, measured, floors, known: Vec::new(), rows, free };
         let effects = bench.stack(&Trace { torque: effects, table: base.table.clone() });
-        bench.known = dot(&effects, &effects);
+        bench.known = channel_squares(&effects, rows);
         bench
     }
 
