@@ -36,6 +36,9 @@ const LEAST_T: f64 = 0.9;
 /// Least share of the variance that causes explain, found or believed: a sixteenth in amplitude. No law holds more exactly on a machine.
 const LEAST_SHARE: f64 = 0.004;
 
+/// Share of what is explained in one channel, torque or table, that is enough by itself: a third in amplitude.
+const MUCH_OF_ONE: f64 = 0.1;
+
 /// Least size of a cause in its standard deviations: it must be known to be there at all.
 const LEAST_STRENGTH: f64 = 2.5;
 
@@ -204,17 +207,18 @@ fn shrink(bench: &Bench, empty: &Fit, mut fit: Fit, watch: &Watch) -> Result<Fit
     Ok(fit)
 }
 
-/// The part that explains less than the others, and what is believed, may well leave by being not quite the law they follow:
-/// in every channel, for a scale on the table may be explained to a thousandth where the torque is not.
+/// The part that explains less than the others, and what is believed, may well leave by being not quite the law they follow.
+/// What explains much of one channel is not slight, however much larger the other is: a scale on the table without noise
+/// would hide all that the torque shows.
 fn slight(bench: &Bench, empty: &Fit, without: &[Fit], fit: &Fit) -> Option<usize> {
     let (left, before) = (fit.channels(), empty.channels());
-    // Above 1 in a channel, the part is worth its name there.
+    let explained: Vec<f64> = (0..left.len()).map(|c| bench.known[c] + before[c] - left[c]).collect();
+    // Above 1, the part is worth its name.
     let worth = |less: &Fit| {
-        let channel = |(c, less): (usize, f64)| {
-            let least = (LEAST_SHARE * (bench.known[c] + before[c] - left[c])).max(LEAST_GAIN * left[c]);
-            (less - left[c]) / least
-        };
-        less.channels().into_iter().enumerate().map(channel).fold(0.0, f64::max)
+        let gained: Vec<f64> = less.channels().iter().zip(&left).map(|(less, left)| less - left).collect();
+        let all = gained.iter().sum::<f64>() / (LEAST_SHARE * explained.iter().sum::<f64>());
+        let one = |c: usize| gained[c] / (MUCH_OF_ONE * explained[c]).max(LEAST_GAIN * left[c]);
+        (0..left.len()).map(one).fold(all, f64::max)
     };
     let weakest = (0..without.len()).min_by(|&a, &b| worth(&without[a]).total_cmp(&worth(&without[b])))?;
     (worth(&without[weakest]) < 1.0).then_some(weakest)
