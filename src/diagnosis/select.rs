@@ -23,9 +23,11 @@ const AT_A_TIME: usize = 8;
 /// Least gain of a cause in Σ ln(mean square): 8 % of what is left. A smaller one would not be worth a machinist's time,
 /// and imperfect filters, grids and reversals make up to half of it on machines without any fault.
 pub const LEAST_GAIN: f64 = 0.08;
-/// Least gain at the best start for a cause to be refined. Starts lie close enough for half of what refining brings; the size
-/// of a cause without a coefficient is not fitted before it is refined.
-const LEAST_AT_START: f64 = 0.25 * LEAST_GAIN;
+/// Least share of what refining brings that a cause shows at its best start. Starts lie close enough for half.
+const SHOWN_AT_START: f64 = 0.25;
+/// Least gain at the best start for a cause to be refined; the size of a cause without a coefficient is not fitted before it
+/// is refined.
+const LEAST_AT_START: f64 = SHOWN_AT_START * LEAST_GAIN;
 /// What a further fitted number must gain where sets of causes compete.
 const NUMBER_PRICE: f64 = 0.003;
 
@@ -91,15 +93,7 @@ pub fn select(bench: &Bench, laws: &[&'static Law], watch: &Watch) -> Result<Sel
     for depth in 0..MOST {
         // Most searches end after a cause or two, so that the first steps are most of the work.
         let share = |steps: usize| 0.8 - 0.65 * 0.4f64.powi(steps as i32);
-        let mut grown: Vec<Fit> = Vec::new();
-        for set in &beam {
-            for child in grow(&search, set, (share(depth), share(depth + 1)))? {
-                if price(&child) < price(set) - 0.5 * LEAST_GAIN && !grown.iter().any(|f| same_causes(f, &child)) {
-                    grown.push(child);
-                }
-            }
-        }
-        grown.sort_by(|a, b| price(a).total_cmp(&price(b)));
+        let mut grown = grow(&search, &beam, (share(depth), share(depth + 1)))?;
         let Some(first) = grown.first() else { break };
         let last_gain = best.last().map_or(f64::INFINITY, |f| price(f) - price(first));
         if last_gain < 0.5 * LEAST_GAIN {
@@ -130,42 +124,73 @@ fn same_causes(a: &Fit, b: &Fit) -> bool {
     causes(a) == causes(b)
 }
 
-/// The set with each of the most promising causes added, refined jointly.
-fn grow(search: &Search, set: &Fit, (from, to): (f64, f64)) -> Result<Vec<Fit>, Stopped> {
-    let Search { bench, laws, shelf, watch } = search;
-    let open: Vec<&'static Law> = laws.iter().copied().filter(|law| may_join(set, law)).collect();
+/// A cause at its best start beside a set.
+struct Child<'s> {
+    set: &'s Fit,
+    part: Part,
+    /// What the set would cost with it.
+    price: f64,
+}
+
+impl Child<'_> {
+    /// The price that refining may reach.
+    fn within_reach(&self) -> f64 {
+        let before = price(self.set);
+        before - (before - self.price).max(LEAST_AT_START) / SHOWN_AT_START
+    }
+}
+
+/// The sets with each of the most promising causes added, refined jointly: those that are worth it, best first.
+fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit>, Stopped> {
+    let Search { bench, laws, watch, .. } = search;
+    let open: Vec<(&Fit, &'static Law)> =
+        beam.iter().flat_map(|set| laws.iter().filter(|law| may_join(set, law)).map(move |law| (set, *law))).collect();
     let half = 0.5 * (from + to);
-    let mut promising: Vec<(f64, Part)> = watch
-        .each(&open, (from, half), "looking for causes", |law| {
-            let fresh: Vec<Part>;
-            let parts: &[Part] = if law.starts_from_rest {
-                fresh = bench.parts(law, bench.starts(law, set));
-                &fresh
-            } else {
-                shelf.get(&law.cause).map_or(&[], Vec::as_slice)
-            };
-            let least =
-                |part: &Part| if part.has_coefficients() { set.figure() - LEAST_AT_START } else { f64::INFINITY };
-            let scored = parts
-                .iter()
-                .map(|part| (figure(&bench.joined(set, part)) + NUMBER_PRICE * part.shape.len() as f64, part));
-            let best = scored.min_by(|a, b| a.0.total_cmp(&b.0));
-            best.filter(|(value, part)| *value < least(part)).map(|(value, part)| (value, part.clone()))
-        })?
-        .into_iter()
-        .flatten()
-        .collect();
-    promising.sort_by(|a, b| a.0.total_cmp(&b.0));
-    promising.truncate(TRIED);
-    let grown = watch.each(&promising, (half, to), "fitting causes", |(_, part)| {
+    let look = |&(set, law): &(_, _)| at_best_start(search, set, law);
+    let mut children: Vec<Child> =
+        watch.each(&open, (from, half), "looking for causes", look)?.into_iter().flatten().collect();
+    children.sort_by(|a, b| a.price.total_cmp(&b.price));
+    // What cannot come among those that are carried on need not be refined.
+    let carried_on = children.get(BEAM - 1).map_or(f64::INFINITY, |child| child.price);
+    let mut tried: HashMap<Vec<Cause>, usize> = HashMap::new();
+    children.retain(|child| {
+        let count = tried.entry(causes(child.set)).or_default();
+        *count += 1;
+        *count <= TRIED && child.within_reach() < carried_on
+    });
+    let refined = watch.each(&children, (half, to), "fitting causes", |Child { set, part, .. }| {
         let mut parts = set.parts.clone();
         parts.push(part.clone());
         let count = set.parts.len();
         let fit = bench.refine(bench.fit(parts), count, 6);
         let fit = bench.refine(fit, 0, if count == 0 { 4 } else { 2 });
-        is_physical(bench, &fit).then_some(fit)
+        (is_physical(bench, &fit) && price(&fit) < price(set) - 0.5 * LEAST_GAIN).then_some(fit)
     })?;
-    Ok(grown.into_iter().flatten().collect())
+    let mut grown: Vec<Fit> = refined.into_iter().flatten().collect();
+    grown.sort_by(|a, b| price(a).total_cmp(&price(b)));
+    let mut seen: Vec<Vec<Cause>> = Vec::new();
+    grown.retain(|fit| {
+        let fresh = !seen.contains(&causes(fit));
+        seen.push(causes(fit));
+        fresh
+    });
+    Ok(grown)
+}
+
+/// A law where it explains most of what a set leaves, if that is worth refining.
+fn at_best_start<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Option<Child<'s>> {
+    let Search { bench, shelf, .. } = search;
+    let fresh: Vec<Part>;
+    let parts: &[Part] = if law.starts_from_rest {
+        fresh = bench.parts(law, bench.starts(law, set));
+        &fresh
+    } else {
+        shelf.get(&law.cause).map_or(&[], Vec::as_slice)
+    };
+    let figure_with = |part: &Part| figure(&bench.joined(set, part)) + NUMBER_PRICE * part.shape.len() as f64;
+    let (figure, part) = parts.iter().map(|part| (figure_with(part), part)).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let worth = !part.has_coefficients() || figure < set.figure() - LEAST_AT_START;
+    worth.then(|| Child { set, part: part.clone(), price: price(set) + figure - set.figure() })
 }
 
 fn may_join(set: &Fit, law: &Law) -> bool {
