@@ -42,14 +42,6 @@ pub struct Part {
     columns: Arc<[Vec<f64>]>,
 }
 
-impl Part {
-    /// Whether its size is a fitted coefficient.
-    #[must_use]
-    pub fn has_coefficients(&self) -> bool {
-        !self.columns.is_empty()
-    }
-}
-
 /// A fitted set of causes.
 #[derive(Debug, Clone)]
 pub struct Fit {

@@ -25,8 +25,7 @@ const AT_A_TIME: usize = 8;
 pub const LEAST_GAIN: f64 = 0.08;
 /// Least share of what refining brings that a cause shows at its best start. Starts lie close enough for half.
 const SHOWN_AT_START: f64 = 0.25;
-/// Least gain at the best start for a cause to be refined; the size of a cause without a coefficient is not fitted before it
-/// is refined.
+/// Least gain at the best start for a cause to be refined.
 const LEAST_AT_START: f64 = SHOWN_AT_START * LEAST_GAIN;
 /// What a further fitted number must gain where sets of causes compete.
 const NUMBER_PRICE: f64 = 0.003;
@@ -189,7 +188,7 @@ fn at_best_start<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Option
     };
     let figure_with = |part: &Part| figure(&bench.joined(set, part)) + NUMBER_PRICE * part.shape.len() as f64;
     let (figure, part) = parts.iter().map(|part| (figure_with(part), part)).min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let worth = !part.has_coefficients() || figure < set.figure() - LEAST_AT_START;
+    let worth = figure < set.figure() - LEAST_AT_START;
     worth.then(|| Child { set, part: part.clone(), price: price(set) + figure - set.figure() })
 }
 

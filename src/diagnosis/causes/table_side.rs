@@ -199,42 +199,62 @@ impl<'a> Tables<'a> {
     /// Moves the tables on by one row; answers the share of each link's torque that belongs to the row and to the next one, by
     /// how near it acts.
     fn between(&self, i: usize, state: &mut State) -> [Lanes; 2] {
-        let (unit, span, constant) = (self.frame.unit, self.frame.columns.period_s, self.frame.belief.constant);
+        if self.flanks { self.steps_of::<true>(i, state) } else { self.steps_of::<false>(i, state) }
+    }
+
+    fn steps_of<const FLANKS: bool>(&self, i: usize, state: &mut State) -> [Lanes; 2] {
+        let (unit, span) = (self.frame.unit, self.frame.columns.period_s);
         let at = |i: usize| (self.frame.columns.position[i] * unit, self.frame.raw_speed[i] * unit * span);
         let ((q0, d0), (q1, d1)) = (at(i), at(i + 1));
         let (c2, c3) = (3.0 * (q1 - q0) - 2.0 * d0 - d1, 2.0 * (q0 - q1) + d0 + d1);
-        let h = span / self.steps as f64;
+        let (per_step, per_span) = (1.0 / self.steps as f64, 1.0 / span);
+        let half_step = 0.5 * span * per_step;
+        // What a step makes of a torque, of the speed there is, and what speed dry friction takes at most.
+        let mobility = self.inertia.map(|j| span * per_step / j);
+        let kept = lanes(|l| 1.0 - mobility[l] * self.viscous[l]);
+        let dry = lanes(|l| mobility[l] * self.level[l]);
         let (mut x, mut v) = (state.position, state.speed);
-        let (mut near, mut far) = ([0.0; LANES], [0.0; LANES]);
-        let mut apart = [0.0f64; LANES];
+        let (mut sum, mut far, mut least) = ([0.0; LANES], [0.0; LANES], [f64::INFINITY; LANES]);
         for step in 0..self.steps {
-            let s = (step as f64 + 0.5) / self.steps as f64;
+            let s = (step as f64 + 0.5) * per_step;
             let motor = q0 + s * (d0 + s * (c2 + s * c3));
-            let speed = (d0 + s * (2.0 * c2 + s * 3.0 * c3)) / span;
+            let speed = (d0 + s * (2.0 * c2 + s * 3.0 * c3)) * per_span;
             for l in 0..LANES {
-                let middle = x[l] + 0.5 * h * v[l];
-                // Flanks push and never pull.
+                let middle = x[l] + half_step * v[l];
                 let wind = motor - middle;
-                let beyond = wind.abs() - self.half[l];
-                let outward = (speed - v[l]) * 1.0f64.copysign(wind);
-                let touching = if beyond > 0.0 { 1.0 } else { 0.0 };
-                let spring = self.stiffness[l] * beyond + self.damping[l] * outward;
-                let push = if self.flanks { touching * spring.max(0.0) } else { spring };
-                apart[l] = apart[l].max(if push > 0.0 { 0.0 } else { 1.0 });
-                let push = push * 1.0f64.copysign(wind);
-                near[l] += (1.0 - s) * push;
+                let push = if FLANKS {
+                    // Flanks push and never pull.
+                    let outward = (speed - v[l]) * 1.0f64.copysign(wind);
+                    let beyond = wind.abs() - self.half[l];
+                    let spring = larger(self.stiffness[l] * beyond + self.damping[l] * outward, 0.0);
+                    let push = if beyond > 0.0 { spring } else { 0.0 };
+                    least[l] = smaller(push, least[l]);
+                    push.copysign(wind)
+                } else {
+                    self.stiffness[l] * wind + self.damping[l] * (speed - v[l])
+                };
+                sum[l] += push;
                 far[l] += s * push;
-                // Dry friction takes what impulse it can, and never turns it.
-                let impulse = self.inertia[l] * v[l] + h * (push - constant - self.viscous[l] * v[l]);
-                v[l] = (impulse.abs() - h * self.level[l]).max(0.0).copysign(impulse) / self.inertia[l];
-                x[l] = middle + 0.5 * h * v[l];
+                // Dry friction takes what speed it can, and never turns it.
+                let free = kept[l] * v[l] + mobility[l] * (push - self.frame.belief.constant);
+                v[l] = free - larger(smaller(free, dry[l]), -dry[l]);
+                x[l] = middle + half_step * v[l];
             }
         }
-        (state.position, state.speed) = (x, v);
-        state.side = lanes(|l| near[l] + far[l]);
+        (state.position, state.speed, state.side) = (x, v, sum);
         for l in 0..LANES {
-            state.together[l] = if apart[l] == 0.0 { state.together[l] + 1 } else { 0 };
+            state.together[l] = if least[l] > 0.0 { state.together[l] + 1 } else { 0 };
         }
-        [near, far].map(|part| part.map(|sum| sum / self.steps as f64))
+        [lanes(|l| (sum[l] - far[l]) * per_step), far.map(|far| far * per_step)]
     }
+}
+
+/// The larger of two numbers; unlike the library's, which minds NaN, one instruction.
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// The smaller of two numbers, likewise.
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }
