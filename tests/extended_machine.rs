@@ -50,6 +50,20 @@ fn named(d: &Diagnosis) -> Vec<Cause> {
     d.findings.iter().map(|f| f.effect.cause()).collect()
 }
 
+/// A torque caught anywhere in the servo's cycle: where the motor lags by half a cycle, half a cycle of delay moves the column
+/// by a quarter.
+#[test]
+fn a_delay_is_found_at_every_phase_of_the_cycle() {
+    for delay_ms in [-0.9, -0.4, 0.6, 0.8, 1.0, 1.35, 2.7] {
+        let recording = recorded(&rig(&[Effect::DeadTime { delay_ms }]), &test_moves(), 11);
+        let d = judged(&rig(&[]), &recording);
+        assert_eq!(named(&d), vec![Cause::DeadTime], "{delay_ms}");
+        let Effect::DeadTime { delay_ms: found } = d.findings[0].effect else { panic!() };
+        let deviation = d.findings[0].deviations[0];
+        assert!((found - delay_ms).abs() < 3.0 * deviation && deviation < 0.1, "{delay_ms}: {found} ± {deviation}");
+    }
+}
+
 /// Found, written to a machine file, simulated from that file, and diagnosed against it: nothing is left to be said.
 #[test]
 fn what_was_found_and_simulated_again_is_no_discrepancy() {

@@ -11,6 +11,7 @@ use super::filter::{LowPass, convolve, norm, of_three};
 use super::fit::dot;
 use super::sampling::{NUMEROV, Sampling};
 use crate::machine::{Axis, Belief, Effect};
+use crate::plant::lateness::Lateness;
 use std::ops::Range;
 
 /// Plain columns of one axis: what a diagnosis needs of a recording.
@@ -71,8 +72,12 @@ pub struct Frame<'a> {
     pub direction: Vec<f64>,
     /// The encoder's grid, load units.
     pub grid: f64,
-    /// By how much the torque column is late by sampling and as believed, s.
-    pub known_delay_s: f64,
+    /// By how much the torque column is late by sampling, beyond what its mean over a row takes care of, s.
+    sampled_late_s: f64,
+    /// Its timing by a delay.
+    pub lateness: Lateness,
+    /// By how much a delay is believed to make it later, s.
+    pub believed_late_s: f64,
     /// Rows that are judged.
     pub kept: Vec<usize>,
     /// Weight of each judged row in the torque balance, mean square 1: less where friction may have been at rest.
@@ -116,6 +121,7 @@ impl<'a> Frame<'a> {
         let resting = resting_rows(columns, resolution);
         let direction = direction_of(columns, &v, &a, resolution);
         let sampling = Sampling::of(axis, columns);
+        let lateness = Lateness::of(axis, columns.recorded_period_s);
         let torque = low_pass.run(&of_three(&columns.torque, sampling.weights, stretches), stretches);
         let low_pass_kernel = low_pass.kernel();
         let kernel = convolve(&low_pass_kernel, &NUMEROV);
@@ -155,7 +161,9 @@ impl<'a> Frame<'a> {
             raw_speed: central,
             direction,
             grid,
-            known_delay_s: sampling.shift_s + believed_delay(axis),
+            sampled_late_s: sampling.shift_s,
+            lateness,
+            believed_late_s: lateness.of_delay(believed_delay(axis)),
             kept,
             weights,
             blocks,
@@ -204,7 +212,7 @@ impl<'a> Frame<'a> {
     /// A function of the measured torque, filtered and aligned as the torque is.
     #[must_use]
     pub fn aligned(&self, values: &[f64]) -> Vec<f64> {
-        let shift = self.known_delay_s / self.columns.period_s;
+        let shift = (self.sampled_late_s + self.believed_late_s) / self.columns.period_s;
         let (rows, between) = (shift.floor(), shift - shift.floor());
         // Catmull and Rom's weights at that place between rows −1, 0, 1 and 2, with a fifth that makes the kernel odd.
         let unit =
@@ -220,11 +228,19 @@ impl<'a> Frame<'a> {
         self.judged(&(0..self.x.len()).map(value).collect::<Vec<_>>())
     }
 
-    /// The measured torque at the judged rows, if the column is late by `delay_s` beyond what is known.
+    /// The measured torque at the judged rows, if the column is late by `late_s` beyond what is known. What a delay has
+    /// flattened is raised again.
     #[must_use]
-    pub fn torque(&self, delay_s: f64) -> Vec<f64> {
-        let shift = (self.known_delay_s + delay_s) / self.columns.period_s;
-        self.kept.iter().map(|&i| cubic_at(&self.torque, i as f64 + shift)).collect()
+    pub fn torque(&self, late_s: f64) -> Vec<f64> {
+        let late_s = self.believed_late_s + late_s;
+        let shift = (self.sampled_late_s + late_s) / self.columns.period_s;
+        let flattened = self.lateness.flattened_s2(late_s) / self.columns.period_s.powi(2);
+        let raised = |&i: &usize| {
+            let at = |k: f64| cubic_at(&self.torque, i as f64 + shift + k);
+            let bend = if flattened > 0.0 { at(-1.0) - 2.0 * at(0.0) + at(1.0) } else { 0.0 };
+            at(0.0) - flattened * bend
+        };
+        self.kept.iter().map(raised).collect()
     }
 
     /// Noise floor of a filtered column at the judged rows, in its unit: what white noise through the filter would be,

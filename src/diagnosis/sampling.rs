@@ -7,11 +7,11 @@
 //!   two rows T(u·Ts) = T₀ + (T₁ − T₀)·(1 − e^(−r·u))/(1 − e^(−r)), r = Ts/τ. The weights are the integrals of that under the
 //!   triangle; they are not even, which is how late the column is by sampling.
 //! - Other rows: what is smooth between them has (1, 10, 1)/12, exact to the fourth order (Numerov), and is late by
-//!   [`sampling_shift_s`].
+//!   [`Lateness`] says.
 
 use super::frame::Columns;
 use crate::machine::Axis;
-use crate::plant::predict::sampling_shift_s;
+use crate::plant::lateness::Lateness;
 
 /// The triangular mean of what is smooth between rows.
 pub const NUMEROV: [f64; 3] = [1.0 / 12.0, 10.0 / 12.0, 1.0 / 12.0];
@@ -35,7 +35,7 @@ impl Sampling {
             Some(servo) if whole && (recorded / servo.period_s - 1.0).abs() < 0.01 => {
                 Self { weights: of_cycles(servo.period_s, servo.torque_time_constant_s), shift_s: 0.0 }
             }
-            _ => Self { weights: NUMEROV, shift_s: sampling_shift_s(axis, recorded) },
+            _ => Self { weights: NUMEROV, shift_s: Lateness::of(axis, recorded).by_sampling_s },
         }
     }
 }

@@ -4,6 +4,7 @@ pub mod axis;
 pub mod closed_loop;
 mod coupling;
 pub mod friction;
+pub mod lateness;
 pub mod motion;
 pub mod moves;
 pub mod noise;

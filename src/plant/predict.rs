@@ -8,10 +8,11 @@
 //!
 //! Sampling: a row holds the torque at the end of a cycle, before the servo answers to that row. The servo held its command
 //! for that cycle and the motor followed with time constant τ, so the row is later than the smooth torque of the motion:
-//! see [`sampling_shift_s`].
+//! see [`Lateness`].
 
 use super::coupling::{longest_step_s, transmitted};
 use super::friction::Friction;
+use super::lateness::Lateness;
 use super::motion::{Motion, cubic_at, smoothed};
 use super::observed::Observed;
 use super::physics::{Physics, Ripple};
@@ -37,7 +38,10 @@ pub struct TorquePrediction {
 pub fn predict_torque(axis: &Axis, observed: &Observed) -> Result<TorquePrediction, String> {
     let mut physics = Physics::of(axis)?;
     let ripples = (std::mem::take(&mut physics.cogging), std::mem::take(&mut physics.vibration));
-    let shift = (physics.delay_s + sampling_shift_s(axis, observed.period_s)) / observed.period_s;
+    let lateness = Lateness::of(axis, observed.period_s);
+    let late_s = lateness.of_delay(physics.delay_s);
+    let shift = (lateness.by_sampling_s + late_s) / observed.period_s;
+    let flattened = lateness.flattened_s2(late_s) / observed.period_s.powi(2);
 
     let nothing = || vec![f64::NAN; observed.time_s.len()];
     let mut delivered = nothing();
@@ -58,29 +62,12 @@ pub fn predict_torque(axis: &Axis, observed: &Observed) -> Result<TorquePredicti
         }
         let part = &delivered[run.clone()];
         for i in 0..part.len() {
-            torque[run.start + i] = if shift == 0.0 { part[i] } else { cubic_at(part, i as f64 - shift) };
+            let at = |k: f64| cubic_at(part, i as f64 - shift + k);
+            let bend = if flattened > 0.0 { at(-1.0) - 2.0 * at(0.0) + at(1.0) } else { 0.0 };
+            torque[run.start + i] = if shift == 0.0 { part[i] } else { at(0.0) + flattened * bend };
         }
     }
     Ok(TorquePrediction { torque, physics, phases_unknown })
-}
-
-/// How much later than the torque of the motion the logged one is by sampling alone, s.
-///
-/// When the servo's output steps at a row, the rows show 1 − e^(−k·Ts/τ) from there on, a step that is centred
-/// Ts/(1 − e^(−Ts/τ)) − Ts/2 later; the torque itself is centred τ later, and that is what the motion shows. The
-/// difference is half a cycle without a lag, and goes to nothing where the motor is slow. It holds for rows that are
-/// cycles, or every so many cycles; faster rows, or rows of another clock, meet the torque at all phases of the cycle and
-/// are late by nothing.
-#[must_use]
-pub fn sampling_shift_s(axis: &Axis, row_period_s: f64) -> f64 {
-    let Some(servo) = &axis.servo else { return 0.0 };
-    let (period, lag) = (servo.period_s, servo.torque_time_constant_s);
-    let cycles = row_period_s / period;
-    if cycles < 0.99 || (cycles - cycles.round()).abs() > 0.01 {
-        return 0.0;
-    }
-    let seen = if lag > 0.0 { period / (1.0 - (-period / lag).exp()) } else { period };
-    seen - 0.5 * period - lag
 }
 
 /// Torque that the motor must deliver, without ripples, for one run of rows.

@@ -3,7 +3,8 @@
 
 use super::*;
 
-/// Parameter: the delay in ms. The trace is the measured torque less itself moved up; it has no coefficient.
+/// Parameter: by how much later the column is, in ms, which between whole cycles is not the delay ([`crate::plant::lateness`]).
+/// The trace is the measured torque less itself moved up; it has no coefficient.
 pub static LAW: Law = Law {
     cause: Cause::DeadTime,
     scales: &[Scale::Linear(-20.0, 20.0, 0.05)],
@@ -22,7 +23,10 @@ pub static LAW: Law = Law {
             Term { fixed: Some(Trace::torque(fixed)), regressors: Vec::new() }
         })
     },
-    effect: |_, shape, _| Some(Effect::DeadTime { delay_ms: *shape.first()? }),
+    effect: |frame, shape, _| {
+        let late_s = |more_ms: f64| frame.lateness.delay_of(frame.believed_late_s + 1e-3 * more_ms);
+        Some(Effect::DeadTime { delay_ms: 1e3 * (late_s(*shape.first()?) - late_s(0.0)) })
+    },
     confused_with: &[Cause::InertiaMismatch, Cause::ViscousFrictionMismatch],
     sentence: |effect, _| match effect {
         Effect::DeadTime { delay_ms } => format!(
