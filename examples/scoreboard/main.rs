@@ -18,13 +18,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Hides random effects in random machines and scores what `gib diagnose` says about them.
 #[derive(Parser)]
 struct Options {
-    /// How many cases; every 32 hold each cause once, two at once four times, outside effects five times, nothing four times.
+    /// How many cases; every 32 hold each cause once, two at once three times, wrong beliefs, outside effects five times, nothing four times.
     #[arg(long, default_value_t = 32)]
     cases: usize,
     /// Seed; the clock where left out. It is printed, and repeats the run.
     #[arg(long)]
     seed: Option<u64>,
-    /// Hide only this: a cause, an outside effect, `none` or `two`.
+    /// Hide only this: a cause, an outside effect, `none`, `two` or `beliefs`.
     #[arg(long)]
     cause: Option<String>,
     /// Only the case of this number.
@@ -61,7 +61,7 @@ fn main() -> ExitCode {
         Some(Ok(kind)) => Some(kind),
         Some(Err(name)) => {
             eprintln!(
-                "--cause {name}: not a cause. Known: none two {} {}",
+                "--cause {name}: not a cause. Known: none two beliefs {} {}",
                 effects::CAUSES.join(" "),
                 outside::NAMES.join(" ")
             );
@@ -145,11 +145,13 @@ fn line(index: usize, case: &Case, score: Option<&Score>) -> String {
     let sizes: Vec<String> = case.sizes.iter().map(|s| format!("{s:.1}")).collect();
     let rig = &case.rig;
     let about = format!(
-        "{index:>4} {hidden} [{}× floor; {:?} {:.0} Hz {:.0} s{}]",
+        "{index:>4} {hidden} [{}× floor; {:?} {:.0} Hz{} {:.0} s {:?}{}]",
         sizes.join(", "),
         rig.drive,
         1.0 / rig.servo.period,
+        if rig.every > 1 { format!("/{}", rig.every) } else { String::new() },
         rig.duration,
+        rig.style,
         if rig.table.is_some() { ", table" } else { "" }
     );
     match score {

@@ -22,7 +22,7 @@ pub struct Bench<'f, 'a> {
     pub measured: Vec<f64>,
     /// Noise floors of torque and table − encoder at the judged rows, first guess.
     pub floors: [f64; 2],
-    /// Mean square, scaled, of what the belief's effects add to its base values; a channel each.
+    /// What the belief's effects add to its base values, stacked and scaled.
     pub known: Vec<f64>,
     /// Judged rows of the torque; those of the table follow.
     pub rows: usize,
@@ -78,8 +78,7 @@ impl<'f, 'a> Bench<'f, 'a> {
             free.push(level);
         }
         let mut bench = Self { frame, measured, floors, known: Vec::new(), rows, free };
-        let effects = bench.stack(&Trace { torque: effects, table: base.table.clone() });
-        bench.known = channel_squares(&effects, rows);
+        bench.known = bench.stack(&Trace { torque: effects, table: base.table.clone() });
         bench
     }
 

@@ -127,7 +127,8 @@ pub fn diagnose(
     let bench = Bench::new(&frame, &known::trace(axis, &frame));
     let empty = bench.fit(Vec::new());
     let laws: Vec<&'static Law> = LAWS.iter().copied().filter(|law| belief::may_be_found(axis, law.cause)).collect();
-    let selection = select(&bench, &laws, &watch)?;
+    let suffices = |found: &Selection| judge(&bench, &empty, found).0 != Verdict::UnknownCause;
+    let selection = select(&bench, &laws, suffices, &watch)?;
     let (verdict, fit) = judge(&bench, &empty, &selection);
     let findings = findings(axis, &bench, fit, &selection, &empty);
     let effects: Vec<Effect> = findings.iter().map(|f| f.effect).collect();

@@ -23,7 +23,7 @@ const SIZING_STEP: f64 = 2.5e-5;
 pub const LEAST: f64 = 1.3;
 /// The most: beyond it nobody needs a diagnosis to see that something is wrong. A clearance is as wide as it is: its flanks
 /// meet as hard in a narrow one.
-const MOST: f64 = 40.0;
+const MOST: f64 = 100.0;
 const MOST_OF_CLEARANCE: f64 = 400.0;
 
 /// What to hide.
@@ -32,6 +32,8 @@ pub enum Kind {
     Nothing,
     One(&'static str),
     Two,
+    /// Two to four numbers of the belief are wrong, and in half of the cases there is something else as well.
+    Beliefs,
     Outside(&'static str),
 }
 
@@ -42,7 +44,8 @@ impl Kind {
         let round = index / 32;
         match place {
             1 | 11 | 21 | 31 => Self::Nothing,
-            4 | 14 | 24 | 29 => Self::Two,
+            4 | 14 | 24 => Self::Two,
+            29 => Self::Beliefs,
             7 | 12 | 17 | 22 | 27 => {
                 let nth = [7, 12, 17, 22, 27].iter().position(|p| *p == place).unwrap_or(0) + 5 * round + seed as usize;
                 Self::Outside(outside::NAMES[nth % outside::NAMES.len()])
@@ -59,6 +62,7 @@ impl Kind {
         match name {
             "none" => Some(Self::Nothing),
             "two" => Some(Self::Two),
+            "beliefs" => Some(Self::Beliefs),
             _ => (effects::CAUSES.iter().find(|c| **c == name).map(|c| Self::One(c)))
                 .or_else(|| outside::NAMES.iter().find(|c| **c == name).map(|c| Self::Outside(c))),
         }
@@ -187,7 +191,7 @@ impl Bench {
 }
 
 fn draw_command(rig: &Rig, duration: f64, slow: f64, random: &mut Random) -> Command {
-    let (start, segments) = moves::draw(random, &rig.reach, duration, slow);
+    let (start, segments) = moves::draw_style(random, rig.style, &rig.reach, duration, slow);
     let mut command = moves::sample(start, &segments, rig.servo.period, duration, rig.smoothing);
     // The servo gets what the recording says, to the last digit.
     command.position.iter_mut().for_each(|c| *c = (*c * 1e7).round() / 1e7);
@@ -200,6 +204,26 @@ fn runs_well(rig: &Rig, r: &Recording) -> bool {
     let lag = rig.reach.speed * ((1.0 - rig.servo.feedforward) / rig.servo.position_gain + 4.0 * rig.servo.period);
     let dynamic = 0.3 * rig.reach.speed / rig.servo.position_gain;
     r.limited < r.command.len() / 50 && worst < 1.5 * lag + 2.0 * dynamic
+}
+
+/// Causes that are hidden together; `None` where they may not be.
+fn together(kind: Kind, rig: &Rig, random: &mut Random) -> Option<Vec<&'static str>> {
+    let possible = |c: &&&str| effects::possible(c, rig) && (rig.table.is_some() || !effects::on_table_only(c));
+    let causes: Vec<&str> = effects::CAUSES.iter().filter(possible).copied().collect();
+    let (beliefs, others): (Vec<&str>, Vec<&str>) = causes.iter().partition(|c| effects::BELIEFS.contains(c));
+    let list = if kind == Kind::Two {
+        vec![random.pick(&causes), random.pick(&causes)]
+    } else {
+        let left_out = random.uniform(0.0, 2.0 * beliefs.len() as f64) as usize;
+        let mut list: Vec<&str> = (0..beliefs.len()).filter(|i| *i != left_out).map(|i| beliefs[i]).collect();
+        list.truncate(random.pick(&[2, 3, 4]));
+        if random.chance(0.5) {
+            list.push(random.pick(&others));
+        }
+        list
+    };
+    let fit = (0..list.len()).all(|i| (0..i).all(|j| effects::separable(list[i], list[j])));
+    fit.then_some(list)
 }
 
 impl Case {
@@ -225,21 +249,18 @@ impl Case {
             Kind::Nothing => {}
             Kind::One(cause) => {
                 let mut effect = Effect::draw(cause, &bench.rig, bench.peak, random);
-                let target = random.log_uniform(LEAST, 10.0);
+                // One in six is large.
+                let target = if random.chance(1.0 / 6.0) {
+                    random.log_uniform(10.0, 0.9 * MOST)
+                } else {
+                    random.log_uniform(LEAST, 10.0)
+                };
                 let noise_may_move = random.chance(0.5) || effect.power != 1.0;
                 sizes.push(bench.fit(&mut effect, target, noise_may_move)?);
                 hidden.push(effect);
             }
-            Kind::Two => {
-                let possible = |c: &&&str| {
-                    effects::possible(c, &bench.rig) && (bench.rig.table.is_some() || !effects::on_table_only(c))
-                };
-                let causes: Vec<&str> = effects::CAUSES.iter().filter(possible).copied().collect();
-                let (a, b) = (random.pick(&causes), random.pick(&causes));
-                if !effects::separable(a, b) {
-                    return None;
-                }
-                for cause in [a, b] {
+            Kind::Two | Kind::Beliefs => {
+                for cause in together(kind, &bench.rig, random)? {
                     let mut effect = Effect::draw(cause, &bench.rig, bench.peak, random);
                     let target = random.log_uniform(1.5, 8.0);
                     sizes.push(bench.fit(&mut effect, target, false)?);

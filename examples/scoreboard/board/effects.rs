@@ -29,6 +29,10 @@ pub const CAUSES: [&str; 19] = [
     "screw_periodic_error",
 ];
 
+/// Those that are a wrong number of the belief.
+pub const BELIEFS: [&str; 4] =
+    ["inertia_mismatch", "coulomb_friction_mismatch", "viscous_friction_mismatch", "constant_torque"];
+
 /// Resonance of the stiff flanks of a clearance, Hz: far above what a servo sees, so that only the clearance shows.
 const FLANK_HZ: f64 = 900.0;
 
@@ -72,10 +76,12 @@ pub fn on_table_only(cause: &str) -> bool {
     cause.starts_with("screw_")
 }
 
-/// Whether two causes may be hidden together: not two of those that all act within the lost motion of one reversal.
+/// Whether two causes may be hidden together: not two of those that all act within the lost motion of one reversal, and not
+/// a cable beside a constant torque, which is the same cable whose force is zero elsewhere.
 pub fn separable(a: &str, b: &str) -> bool {
     let lost_motion = |c: &str| ["presliding_friction", "backlash", "drive_compliance"].contains(&c);
-    a != b && !(lost_motion(a) && lost_motion(b))
+    let level = |c: &str| ["constant_torque", "cable_force"].contains(&c);
+    a != b && !(lost_motion(a) && lost_motion(b)) && !(level(a) && level(b))
 }
 
 impl Effect {
@@ -146,7 +152,8 @@ impl Effect {
                 form[0] = rig.duration * r.uniform(0.12, 0.5);
                 (0.06 * tc, 0.8 * tc, 1.0)
             }
-            "dead_time" => (1e-4, 4e-3, 1.0),
+            // Up to three cycles.
+            "dead_time" => (1e-4, f64::max(4e-3, 3.0 * rig.servo.period), 1.0),
             "external_vibration" => {
                 form = [r.log_uniform(4.0, (0.1 / rig.servo.period).min(80.0)), r.phase(), 0.0];
                 (0.02 * tc, 0.6 * tc, 1.0)
@@ -296,7 +303,8 @@ mod tests {
 
     /// A rig of each drive, with a smooth servo and a scale, and a run of it.
     fn bench(drive: Drive) -> (Rig, moves::Command) {
-        let fits = |r: &Rig| r.drive == drive && r.gearing != 36.0 && r.servo.period >= 1e-3;
+        let fits =
+            |r: &Rig| r.drive == drive && r.gearing != 36.0 && (1e-3..3e-3).contains(&r.servo.period) && r.every == 1;
         let mut rig = (0..999).map(|s| Rig::draw(&mut Random::new(11, s), 10.0)).find(fits).unwrap();
         rig.table = Some(Scale { step: 1e-6, noise: 0.0, zero: 0.0 });
         let (start, segments) = moves::draw(&mut Random::new(5, 5), &rig.reach, rig.duration, 0.3);

@@ -26,6 +26,103 @@ pub enum Segment {
     Wave { amplitude: f64, frequency: f64, cycles: usize },
 }
 
+/// What kind of run it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// Everything an identification wants.
+    Mixed,
+    /// The same over a third of stroke and time, three times over.
+    Laps,
+    /// Production: rapids between a few stations, and one slow reversal.
+    Stations,
+    /// Waves from slow to fast, after one way across the stroke.
+    Sweep,
+}
+
+/// Draws a run of that style.
+pub fn draw_style(
+    random: &mut Random,
+    style: Style,
+    reach: &Reach,
+    duration: f64,
+    slow_share: f64,
+) -> (f64, Vec<Segment>) {
+    match style {
+        Style::Mixed => draw(random, reach, duration, slow_share),
+        Style::Laps => {
+            let part = Reach { high: reach.low + (reach.high - reach.low) / 3.0, ..*reach };
+            let (start, mut lap) = draw(random, &part, duration / 3.0, slow_share);
+            lap.push(Segment::Move { to: start, speed: 0.5 * reach.speed, acceleration: 0.5 * reach.acceleration });
+            (start, [lap.clone(), lap.clone(), lap].concat())
+        }
+        Style::Stations => stations(random, reach, duration),
+        Style::Sweep => sweep(random, reach, duration),
+    }
+}
+
+fn stations(random: &mut Random, reach: &Reach, duration: f64) -> (f64, Vec<Segment>) {
+    let count = random.pick(&[2usize, 3, 4, 6]);
+    let stroke = reach.high - reach.low;
+    // Stations on a raster, so that no two are the same.
+    let at: Vec<f64> =
+        (0..count).map(|i| reach.low + stroke * (i as f64 + random.uniform(0.0, 0.6)) / (count as f64 - 0.4)).collect();
+    let (mut here, mut time) = (0, 0.0);
+    let mut segments = vec![Segment::Dwell { time: random.uniform(0.1, 0.4) }];
+    let speeds: Vec<f64> = (0..3).map(|_| reach.speed * random.log_uniform(0.2, 1.0)).collect();
+    // The slow reversal comes in the second quarter: it is a small part of the run.
+    let mut slow = Some(duration * random.uniform(0.25, 0.5));
+    while time < duration {
+        if slow.is_some_and(|at| time > at) {
+            slow = None;
+            let speed = reach.speed * random.log_uniform(0.005, 0.05);
+            let travel = (0.06 * duration * speed).min(0.3 * stroke);
+            let way = if at[here] + travel > reach.high { -travel } else { travel };
+            for to in [at[here] + way, at[here]] {
+                segments.push(Segment::Move { to, speed, acceleration: 0.3 * reach.acceleration });
+                time += travel / speed;
+            }
+        }
+        let next = (here + 1 + random.uniform(0.0, (count - 1) as f64) as usize) % count;
+        let go = Segment::Move {
+            to: at[next],
+            speed: random.pick(&speeds),
+            acceleration: reach.acceleration * random.pick(&[0.5, 1.0]),
+        };
+        let stop = Segment::Dwell { time: random.uniform(0.05, 0.4) };
+        time += length(at[here], &go) + length(at[next], &stop);
+        segments.extend([go, stop]);
+        here = next;
+    }
+    (at[0], segments)
+}
+
+fn sweep(random: &mut Random, reach: &Reach, duration: f64) -> (f64, Vec<Segment>) {
+    let stroke = reach.high - reach.low;
+    let speed = (reach.speed * random.uniform(0.1, 0.5)).max(8.0 * stroke / duration);
+    let start = reach.low;
+    let mut segments = vec![
+        Segment::Dwell { time: random.uniform(0.1, 0.4) },
+        Segment::Move { to: reach.high, speed, acceleration: reach.acceleration },
+        Segment::Move { to: reach.low + 0.3 * stroke, speed, acceleration: reach.acceleration },
+    ];
+    let (steps, share) = (random.pick(&[6usize, 9, 12]), random.uniform(0.2, 0.9));
+    let (slowest, fastest) = (random.uniform(0.2, 0.4), random.uniform(2.0, 8.0f64));
+    let mut time = 2.0 * stroke / speed;
+    let each = (duration - time) / steps as f64;
+    for i in 0..steps {
+        let frequency = slowest * (fastest / slowest).powf(i as f64 / (steps - 1) as f64);
+        let omega = std::f64::consts::TAU * frequency;
+        let limit = (reach.speed / omega).min(0.8 * reach.acceleration / (omega * omega)).min(0.6 * stroke);
+        let cycles = ((each * frequency).floor() as usize).max(1);
+        segments.push(Segment::Wave { amplitude: share * limit, frequency, cycles });
+        time += cycles as f64 / frequency;
+    }
+    if time < duration {
+        segments.push(Segment::Dwell { time: duration - time });
+    }
+    (start, segments)
+}
+
 /// Draws a run of about `duration` s. Every run holds a rapid across most of the stroke, a sweep each way at a middle speed,
 /// slow reversals, a wave and a dwell, in random order; the rest is filled at random. The stroke must take a rapid no longer
 /// than an eighth of the run. `slow_share` (0..1) asks for more slow reversals.
@@ -194,6 +291,24 @@ fn averaged(raw: &[f64], before: f64, width: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn runs_of_every_style_keep_the_stroke_and_the_speed_and_go_across_it() {
+        for seed in 0..40 {
+            for style in [Style::Mixed, Style::Laps, Style::Stations, Style::Sweep] {
+                let (start, segments) = draw_style(&mut Random::new(seed, 2), style, &REACH, 15.0, 0.3);
+                let Command { position: x, .. } = sample(start, &segments, 1e-3, 15.0, 0.0);
+                let (low, high) = x.iter().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
+                assert!(low > REACH.low - 1e-9 && high < REACH.high + 1e-9, "seed {seed} {style:?}: {low} {high}");
+                assert!(high - low > 0.15 * (REACH.high - REACH.low), "seed {seed} {style:?}: {low} {high}");
+                let fastest = x.windows(2).map(|w| (w[1] - w[0]).abs() / 1e-3).fold(0.0, f64::max);
+                assert!(
+                    (0.2 * REACH.speed..1.0001 * REACH.speed).contains(&fastest),
+                    "seed {seed} {style:?}: {fastest}"
+                );
+            }
+        }
+    }
 
     const REACH: Reach = Reach { low: 10.0, high: 310.0, speed: 300.0, acceleration: 2000.0 };
 

@@ -135,10 +135,27 @@ pub fn run(rig: &Rig, truth: &Truth, command: &Command, step: f64, noise: &mut R
         out.unexplained.push(left);
         out.torque.push(on_grid(caught[from] + rig.torque_noise * noise.normal(), rig.torque_step));
     }
-    out
+    out.thinned(rig.every)
 }
 
 impl Recording {
+    /// What a recorder keeps that takes one cycle in `every`.
+    fn thinned(mut self, every: usize) -> Self {
+        let keep = |column: &mut Vec<f64>| *column = column.iter().step_by(every).copied().collect();
+        let columns = [
+            &mut self.command,
+            &mut self.position,
+            &mut self.torque,
+            &mut self.unexplained,
+            &mut self.table_error,
+            &mut self.clean_torque,
+            &mut self.true_position,
+        ];
+        columns.into_iter().chain(self.table.as_mut()).for_each(keep);
+        self.period *= every as f64;
+        self
+    }
+
     /// Rows in which the true speed keeps its sign and is above `least` (load units/s) for five rows either side.
     pub fn moves(&self, least: f64) -> Vec<bool> {
         let way = least * self.period;
@@ -162,7 +179,7 @@ impl Recording {
         }
         writeln!(file, ",x.{}", if rig.linear() { "force_n" } else { "torque_nm" })?;
         for i in 0..self.command.len() {
-            write!(file, "{:.6}", i as f64 * self.period)?;
+            write!(file, "{:.7}", i as f64 * self.period)?;
             let table = self.table.as_ref().map(|t| t[i]);
             for x in [self.command[i], self.position[i]].into_iter().chain(table) {
                 write!(file, ",{:.decimals$}", x * factor)?;
@@ -189,7 +206,7 @@ mod tests {
     use crate::board::moves;
 
     fn rig(seed: u64) -> Rig {
-        Rig::draw(&mut Random::new(seed, 9), 10.0)
+        Rig { every: 1, ..Rig::draw(&mut Random::new(seed, 9), 10.0) }
     }
 
     fn command(rig: &Rig) -> Command {

@@ -4,7 +4,7 @@
 //! Motor coordinates throughout: angle q in rad and torque in N·m (ball screw, rotary), or travel in m and force in N
 //! (linear). `unit` load units (mm; deg for rotary) are one unit of q.
 
-use super::moves::Reach;
+use super::moves::{Reach, Style};
 use super::random::Random;
 use super::rough::Rough;
 use serde_json::{Value, json};
@@ -77,6 +77,9 @@ pub struct Rig {
     /// Moving average of the command, s.
     pub smoothing: f64,
     pub duration: f64,
+    pub style: Style,
+    /// The recorder keeps one servo cycle in so many.
+    pub every: usize,
     pub rough: Rough,
 }
 
@@ -86,12 +89,12 @@ impl Rig {
         let drive = random.pick(&[Drive::BallScrew, Drive::BallScrew, Drive::Linear, Drive::Rotary]);
         let (gearing, unit) = match drive {
             Drive::BallScrew => {
-                let lead = random.pick(&[5.0, 10.0, 10.0, 12.0, 16.0, 20.0, 25.0]);
+                let lead = random.pick(&[2.0, 5.0, 10.0, 10.0, 12.0, 16.0, 20.0, 25.0, 40.0]);
                 (lead, lead / TAU)
             }
             Drive::Linear => (1.0, 1000.0),
             Drive::Rotary => {
-                let ratio = random.pick(&[1.0, 36.0, 60.0, 90.0, 120.0, 180.0]);
+                let ratio = random.pick(&[1.0, 1.0, 5.0, 36.0, 60.0, 90.0, 120.0, 180.0]);
                 (ratio, 360.0 / TAU / ratio)
             }
         };
@@ -99,20 +102,20 @@ impl Rig {
             Drive::BallScrew => (
                 random.log_uniform(100.0, 500.0),
                 random.log_uniform(1000.0, 5000.0),
-                random.log_uniform(100.0, 600.0),
-                random.log_uniform(5e-4, 1e-2),
+                random.log_uniform(60.0, 1500.0),
+                random.log_uniform(5e-5, 5e-2),
             ),
             Drive::Linear => (
                 random.log_uniform(200.0, 1000.0),
                 random.log_uniform(1500.0, 10_000.0),
-                random.log_uniform(150.0, 800.0),
-                random.log_uniform(15.0, 300.0),
+                random.log_uniform(60.0, 2500.0),
+                random.log_uniform(2.0, 3000.0),
             ),
             Drive::Rotary => (
                 random.log_uniform(30.0, 180.0),
                 random.log_uniform(100.0, 600.0),
                 random.log_uniform(60.0, 360.0),
-                if gearing == 1.0 { random.log_uniform(0.05, 2.0) } else { random.log_uniform(5e-4, 1e-2) },
+                if gearing == 1.0 { random.log_uniform(0.02, 20.0) } else { random.log_uniform(1e-4, 2e-2) },
             ),
         };
         let duration = random.log_uniform(10.0, longest);
@@ -124,7 +127,9 @@ impl Rig {
         let constant = if random.chance(0.5) { 0.0 } else { coulomb * random.uniform(-0.6, 0.6) };
         let limit = random.uniform(1.6, 3.0) * (accelerating + coulomb + viscous * speed / unit + constant.abs());
 
-        let period = 1.0 / random.pick(&[500.0, 800.0, 1000.0, 1000.0, 1000.0, 2000.0, 2000.0, 4000.0]);
+        let rate = random.pick(&[250.0, 500.0, 800.0, 1000.0, 1000.0, 1000.0, 2000.0, 2000.0, 4000.0, 8000.0]);
+        let period = 1.0 / rate;
+        let every = if rate >= 1000.0 && random.chance(0.2) { random.pick(&[2, 4]) } else { 1 };
         let lag = if random.chance(0.2) { 0.0 } else { random.log_uniform(2e-4, 1e-3) };
         let two_sample_mean = random.chance(0.25);
         // Half a period of hold, half of the difference (a whole of the mean), and the lag: the velocity loop keeps 60° of phase.
@@ -143,10 +148,10 @@ impl Rig {
         let torque_noise = coulomb * random.log_uniform(0.01, 0.08);
         // The grid must not make the servo louder than the sensor noise: Kv·√2·step/√12/period ≤ noise.
         let loudest = torque_noise / servo.velocity_gain * unit * period * 6f64.sqrt();
-        let grids = [1e-7, 2e-7, 5e-7, 1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4];
+        let grids = [1e-8, 2e-8, 5e-8, 1e-7, 2e-7, 5e-7, 1e-6, 2e-6, 5e-6, 1e-5, 2e-5, 5e-5, 1e-4, 2e-4, 5e-4];
         let fit: Vec<f64> = grids.iter().copied().filter(|g| *g <= loudest).collect();
         let encoder_step = if fit.is_empty() { grids[0] } else { random.pick(&fit[fit.len().saturating_sub(4)..]) };
-        let torque_step = if random.chance(0.7) { 0.0 } else { torque_noise * random.uniform(0.2, 1.0) };
+        let torque_step = if random.chance(0.6) { 0.0 } else { torque_noise * random.log_uniform(0.2, 4.0) };
         let table = random.chance(0.4).then(|| Scale::draw(random));
         let column = if drive == Drive::Rotary {
             random.pick(&[("deg", 1.0, 8), ("deg", 1.0, 8), ("rad", TAU / 360.0, 10)])
@@ -173,6 +178,8 @@ impl Rig {
             reach: Reach { low, high: low + stroke, speed, acceleration },
             smoothing: if random.chance(0.5) { 0.0 } else { random.uniform(0.005, 0.04) },
             duration,
+            style: random.pick(&[Style::Mixed, Style::Mixed, Style::Laps, Style::Stations, Style::Sweep]),
+            every,
             rough: Rough::NONE,
         }
     }
@@ -267,7 +274,8 @@ mod tests {
             assert!(r.servo.position_gain < 0.35 * r.servo.velocity_gain / r.inertia);
             let need = r.inertia * r.reach.acceleration / r.unit + r.coulomb + r.viscous * r.reach.speed / r.unit;
             assert!(need + r.constant.abs() < 0.7 * r.limit, "stream {stream}: {need} of {}", r.limit);
-            assert!(r.torque_floor() < 1.5 * r.torque_noise, "stream {stream}: the grid is louder than the sensor");
+            let logged = r.torque_noise.hypot(r.torque_step / 12f64.sqrt());
+            assert!(r.torque_floor() < 1.5 * logged, "stream {stream}: the grid is louder than the sensor");
         }
     }
 

@@ -30,6 +30,8 @@ pub struct Summary {
     pub false_alarms: (usize, usize),
     pub unknown: (usize, usize),
     pub both_of_two: (usize, usize),
+    /// Of three and more.
+    pub all_of_several: (usize, usize),
     pub parameter_error: Option<f64>,
     pub covered: (usize, usize),
     pub against_truth: Option<f64>,
@@ -55,6 +57,7 @@ pub fn summarise(scores: &[Score]) -> Summary {
         false_alarms: share(&is_clean, &|s| !s.named.is_empty() || s.verdict != "no_discrepancy"),
         unknown: share(&is_outside, &|s| s.verdict == "unknown_cause" && s.named.is_empty()),
         both_of_two: share(&|s| is_named(s) && s.truth.len() == 2, &|s| s.found == 2),
+        all_of_several: share(&|s| is_named(s) && s.truth.len() > 2, &|s| s.found == s.truth.len()),
         parameter_error: median(parameters.iter().map(|p| p.error.unwrap_or(f64::INFINITY)).collect()),
         covered: (parameters.iter().filter(|p| p.covered).count(), parameters.len()),
         against_truth: known(&|s| s.against_truth),
@@ -83,11 +86,12 @@ fn confusion(scores: &[Score]) -> String {
         let truth = match s.truth.len() {
             0 => "(clean)".to_string(),
             1 => s.truth[0].clone(),
-            _ => "(two)".to_string(),
+            2 => "(two)".to_string(),
+            _ => "(several)".to_string(),
         };
         let said = match (&s.failure, s.named.first()) {
             (Some(_), _) => "FAILED".to_string(),
-            (None, Some(_)) if s.truth.len() == 2 && s.first_right => format!("{} of the two", s.found),
+            (None, Some(_)) if s.truth.len() > 1 && s.first_right => format!("{} of {}", s.found, s.truth.len()),
             (None, Some(name)) => name.clone(),
             (None, None) => format!("[{}]", s.verdict),
         };
@@ -143,6 +147,7 @@ pub fn print(scores: &[Score]) -> String {
         ("false alarms on clean data", percent(s.false_alarms), "≤ 2 %"),
         ("outside effects called unknown", percent(s.unknown), "≥ 90 %"),
         ("both of two right", percent(s.both_of_two), "≥ 85 %"),
+        ("all of three and more right", percent(s.all_of_several), ""),
         ("median parameter error", figure(s.parameter_error, 100.0, " %"), "≤ 3 %"),
         ("95 % intervals that hold the truth", percent(s.covered), "90–98 %"),
         ("hold-out residual over the true model's", figure(s.against_truth, 1.0, ""), "≤ 1.10"),
@@ -198,10 +203,12 @@ mod tests {
             score(&[], &[], "unknown_cause"),
             score(&["outside: detent"], &[], "unknown_cause"),
             score(&["outside: detent"], &["cogging"], "partly_explained"),
+            score(&["cogging", "backlash", "dead_time"], &["backlash", "cogging", "dead_time"], "explained"),
         ];
         let s = summarise(&scores);
-        assert_eq!(s.first_right, (3, 4));
-        assert_eq!(s.wrong_beside, (1, 4));
+        assert_eq!(s.all_of_several, (1, 1));
+        assert_eq!(s.first_right, (4, 5));
+        assert_eq!(s.wrong_beside, (1, 5));
         assert_eq!(s.false_alarms, (2, 3));
         assert_eq!(s.unknown, (1, 2));
         assert_eq!(s.both_of_two, (1, 2));

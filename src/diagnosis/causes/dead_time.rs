@@ -11,7 +11,7 @@ pub static LAW: Law = Law {
     starts: |frame, _| {
         let h = frame.columns.period_s * 1e3;
         let step = (0.5 * h).max(0.2);
-        let count = (8.0 / step).round() as i32;
+        let count = (f64::max(8.0, 4.0 * h) / step).round() as i32;
         (-count..=count).filter(|i| *i != 0).map(|i| vec![f64::from(i) * step]).collect()
     },
     starts_from_rest: false,
