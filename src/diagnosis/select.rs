@@ -71,6 +71,16 @@ struct Search<'s, 'f, 'a> {
     watch: &'s Watch<'s>,
 }
 
+impl Search<'_, '_, '_> {
+    /// A set with every number of the belief open.
+    fn with_beliefs(&self, set: &Fit) -> Fit {
+        let missing = self.laws.iter().filter(|law| BELIEF.contains(&law.cause) && may_join(set, law));
+        let mut parts = set.parts.clone();
+        parts.extend(missing.flat_map(|law| self.bench.parts(law, vec![Vec::new()])));
+        self.bench.fit(parts)
+    }
+}
+
 /// Selects causes among these laws on a bench. Where what is found does not suffice, it is looked for again with every number
 /// of the belief open: of several that are wrong together none shows the way by itself.
 ///
@@ -87,8 +97,7 @@ pub fn select(
     if suffices(&first) {
         return Ok(first);
     }
-    let numbers = laws.iter().filter(|law| BELIEF.contains(&law.cause));
-    let second = search_from(&search, bench.fit(numbers.flat_map(|law| bench.parts(law, vec![Vec::new()])).collect()))?;
+    let second = search_from(&search, search.with_beliefs(&bench.fit(Vec::new())))?;
     Ok(if price(&second.fit) < price(&first.fit) { second } else { first })
 }
 
@@ -129,6 +138,9 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
         beam = grown;
     }
     let start = best.pop().unwrap_or_else(|| search.bench.fit(Vec::new()));
+    // What only several numbers of the belief together explain, others may have imitated one by one.
+    let open = search.with_beliefs(&start);
+    let start = if price(&open) < price(&start) - 0.5 * LEAST_GAIN { idle_left_out(search, open)? } else { start };
     let fit = shrink(search.bench, start, search.watch)?;
     rivals.retain(|r| r.parts.len() == fit.parts.len() && !same_causes(r, &fit));
     Ok(Selection { fit, rivals })
@@ -229,6 +241,23 @@ fn may_join(set: &Fit, law: &Law) -> bool {
 
 fn is_physical(bench: &Bench, fit: &Fit) -> bool {
     fit.parts.iter().zip(&fit.coefficients).all(|(p, c)| (p.law.effect)(bench.frame, &p.shape, c).is_some())
+}
+
+/// Drops causes that the others do without as they are, weakest first: refined, the others would do without them all the more.
+fn idle_left_out(search: &Search, mut fit: Fit) -> Result<Fit, Stopped> {
+    loop {
+        let each: Vec<usize> = (0..fit.parts.len()).collect();
+        let without = search.watch.each(&each, (0.8, 0.8), "leaving out what is not needed", |&i| {
+            let mut parts = fit.parts.clone();
+            parts.remove(i);
+            search.bench.fit(parts)
+        })?;
+        let weakest = without.into_iter().min_by(|a, b| price(a).total_cmp(&price(b)));
+        match weakest.filter(|less| price(less) - price(&fit) < LEAST_GAIN) {
+            Some(less) => fit = less,
+            None => return Ok(fit),
+        }
+    }
 }
 
 /// Drops causes that the others can do without, and those that held-out blocks do not bear out.
