@@ -111,7 +111,7 @@ mod tests {
     /// A motor's torque in small steps of time, caught where the delay says.
     #[test]
     fn a_caught_torque_is_the_mean_of_the_ends_of_its_cycle() {
-        let (rate, delay) = (1.7, 2.3);
+        let (rate, delay) = (1.7_f64, 2.3);
         let asked = |cycle: usize| (0.4 * cycle as f64).sin();
         let mut starts = vec![0.0];
         for cycle in 0..20 {
