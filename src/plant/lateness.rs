@@ -102,7 +102,8 @@ mod tests {
         for rate in [0.0, 1e-4, 0.3, 2.0, 20.0] {
             for k in -30..30 {
                 let late = 1e-4 * f64::from(k);
-                assert!((at(rate).of_delay(at(rate).delay_of(late)) - late).abs() < 2e-9, "{rate} {late}");
+                // A millionth of a cycle, to which both are rounded, is up to Ts/τ as much of the other.
+                assert!((at(rate).of_delay(at(rate).delay_of(late)) - late).abs() < 2e-8, "{rate} {late}");
             }
             assert_eq!([-2.0, 0.0, 3.0].map(|n| at(rate).of_delay(1e-3 * n)), [-2e-3, 0.0, 3e-3]);
         }
@@ -128,7 +129,7 @@ mod tests {
             assert!((caught(row) - (1.0 - w) * starts[row - 2] - w * starts[row - 3]).abs() < 1e-12);
         }
         let late = at(rate).of_delay(1e-3 * delay);
-        assert!((late - 1e-3 * (2.0 + w)).abs() < 1e-15 && late < 1e-3 * delay);
-        assert!((at(rate).flattened_s2(late) - 0.5e-6 * w * (1.0 - w)).abs() < 1e-15);
+        assert!((late - 1e-3 * (2.0 + w)).abs() < 1e-12 && late < 1e-3 * delay);
+        assert!((at(rate).flattened_s2(late) - 0.5e-6 * w * (1.0 - w)).abs() < 1e-12);
     }
 }
