@@ -65,6 +65,9 @@ spindle_reading spindle_sense(spindle *s)
     if (weakening > 0.0 && fabs(s->w) > weakening) {
         reported *= fabs(s->w) / weakening;
     }
+    if (s->c.saturation_nm > 0.0 && fabs(reported) > s->c.saturation_nm) {
+        reported *= fabs(reported) / s->c.saturation_nm;
+    }
     r.speed_rpm = grid > 0.0 ? grid * floor(spindle_rpm(s->w) / grid + 0.5) : spindle_rpm(s->w);
     r.torque = reported + s->c.torque_noise_nm * normal(&s->random);
     if (uniform(&s->random) < s->c.outlier_ratio) {

@@ -28,6 +28,7 @@ typedef struct {
     double torque_constant_nm_a; /* the drive reports a current; 0: it reports torque */
     int torque_late_cycles;      /* the torque reported is this old, up to SPINDLE_LATEST */
     double weakening_rpm; /* above: the drive reports w/w_b times the torque delivered; 0: never */
+    double saturation_nm; /* above: it reports T/T_s times that; 0: never */
     double bandwidth_1_s; /* of the speed loop */
     int substeps;         /* of the integration in a cycle */
     uint64_t seed;

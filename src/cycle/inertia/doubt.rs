@@ -39,7 +39,7 @@ fn dead(rows: &Rows, found: &Regression) -> Option<Fault> {
     let counted = || rows.blocks.iter().filter(|b| rows.counts(b));
     let sum: f64 = counted().map(|b| b.torque * b.speed.signum()).sum();
     let noise = found.scatter * (counted().count() as f64).sqrt();
-    let inertia = found.terms[0].abs() / found.covariance[(0, 0)].max(f64::MIN_POSITIVE).sqrt();
+    let inertia = found.terms[0].abs() / found.variance[0].max(f64::MIN_POSITIVE).sqrt();
     let most = inertia.max(sum.abs() / noise.max(f64::MIN_POSITIVE));
     (most < CLEAR).then(|| Fault { low: CLEAR, ..fault("torque_over_noise\0", most, f64::MAX) })
 }
@@ -59,7 +59,7 @@ fn halves(rows: &Rows, found: &Regression) -> Option<Fault> {
     let half = |blocks| Rows { blocks, ..*rows }.fit();
     let (first, second) = (half(first)?, half(second)?);
     let apart = (first.terms[0] - second.terms[0]).abs();
-    let chance = (first.covariance[(0, 0)] + second.covariance[(0, 0)]).max(0.0).sqrt();
+    let chance = (first.variance[0] + second.variance[0]).max(0.0).sqrt();
     let share = apart / found.terms[0].abs().max(f64::MIN_POSITIVE);
     (share > MOST && apart > CLEAR * chance).then(|| fault("halves_apart_ratio\0", share, MOST))
 }

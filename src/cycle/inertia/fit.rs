@@ -6,7 +6,7 @@
 
 use super::blocks::{BLOCKS, Block};
 use super::doubt::{doubt, stuck};
-use super::robust::{Regression, Reported, Rows};
+use super::robust::{Limit, Regression, Rows, Terms};
 use crate::error::{Fault, GIB_ERR_INERTIA_EXCITATION, GIB_ERR_INERTIA_FEW, GIB_ERR_INERTIA_SIGN};
 
 /// What the fit needs to know beside the blocks.
@@ -79,13 +79,17 @@ pub struct Balance {
 const FEWEST: usize = 12;
 /// Expanded uncertainty, as a share of the inertia, beyond which it cannot be called measured: a third.
 const WORST: f64 = 0.33;
-/// How far the evidence for weakening or saturation must stand above chance: the fall of the summed squares over the
-/// variance is χ² with one degree of freedom, and some hundred thresholds are tried; 30 leaves less than one false alarm in
-/// a hundred thousand.
-const EVIDENCE: f64 = 30.0;
-/// Thresholds tried, in equal ratios: a threshold that is 1 % off spoils the fit by 1 % of the torque, hardly more than
-/// the noise of a block.
-const STEPS: usize = 64;
+/// By how many standard deviations torque must exceed motion beyond a threshold for field weakening or saturation. The best of
+/// some dozens of thresholds exceeds 3.6 by chance once in a hundred times (Andrews 1993); 5.5 leaves room for ripple, whose
+/// residuals are neither normal nor independent.
+const EVIDENCE: f64 = 5.5;
+/// That number squared, as a share of the blocks: ripple that keeps step with the ramps looks the same in each, so that more
+/// ramps make it clearer without making it a limit.
+const SHARE: f64 = 0.5;
+/// Rise of the summed squares over the variance that is chance (χ² with one degree of freedom, 68 %).
+const NEAR: f64 = 1.0;
+/// Thresholds tried, in equal ratios of 3 %.
+const STEPS: usize = 32;
 /// The lowest of them, as a share of the largest value seen.
 const LOWEST: f64 = 0.35;
 /// Share of a block's variance that the parabola's weights add to that of a plain mean (6/5).
@@ -150,9 +154,8 @@ fn rows(blocks: &[Block]) -> Rows<'_> {
         blocks,
         both_senses: fewer >= FEWEST / 2,
         noise: acceleration_noise(blocks),
-        speed_limit: f64::MAX,
-        torque_limit: f64::MAX,
-        reported: Reported::Truly,
+        trusted: Limit::none(Terms::zeros()),
+        suspected: None,
     }
 }
 
@@ -201,30 +204,49 @@ fn acceleration_noise(blocks: &[Block]) -> f64 {
     (STD_PER_MAD * middle).powi(2) / 6.0
 }
 
-/// Leaves out what field weakening or saturation spoils, where the blocks show either beyond chance.
+/// Leaves out what field weakening and saturation spoil, one after the other, where they are clear beyond chance.
 fn trustworthy(whole: Rows) -> (Rows, f64, f64) {
+    const MARGIN: f64 = 0.94; // two of the thresholds tried
     let mut rows = whole;
-    let fastest = rows.blocks.iter().map(|b| b.speed.abs()).fold(0.0, f64::max);
-    let weakening = threshold(&rows, fastest, |limit, _| Reported::Weakened(limit));
-    if weakening > 0.0 {
-        rows.speed_limit = 0.97 * weakening;
-    }
-    let strongest = quantile(rows.blocks, 0.98, |b| b.torque.abs());
-    let saturation = threshold(&rows, strongest, |limit, plain| Reported::Saturated(limit, plain.terms));
-    if saturation > 0.0 {
-        rows.torque_limit = 0.97 * saturation;
+    let (mut weakening, mut saturation) = (0.0, 0.0);
+    for _ in 0..2 {
+        let Some(limit) = limit(&rows) else { break };
+        if limit.speed < f64::MAX {
+            weakening = limit.speed;
+            rows.trusted.speed = MARGIN * weakening;
+        } else {
+            saturation = limit.torque;
+            rows.trusted = Limit { torque: MARGIN * saturation, terms: limit.terms, ..rows.trusted };
+        }
     }
     (rows, weakening, saturation)
 }
 
-/// The threshold, tried as shares of `largest`, from which on a corrected balance fits clearly better; 0: none does.
-fn threshold(rows: &Rows, largest: f64, reported: impl Fn(f64, &Regression) -> Reported) -> f64 {
-    let Some(plain) = rows.fit() else { return 0.0 };
-    let mut tried = [(0.0, plain); STEPS + 1];
-    for (step, place) in tried.iter_mut().skip(1).enumerate() {
-        let limit = largest * LOWEST.powf(1.0 - step as f64 / STEPS as f64);
-        if let Some(fit) = (Rows { reported: reported(limit, &plain), ..*rows }).fit() {
-            *place = (limit, fit);
+/// The speed or torque from which on torque exceeds motion, with the balance within it; none where it could be chance.
+fn limit(rows: &Rows) -> Option<Limit> {
+    let plain = rows.fit()?;
+    let found = clearest(rows, &plain, plain.terms)?;
+    // Once more from what was found, since the plain balance is spoilt by what is sought.
+    clearest(rows, &plain, found.terms)
+}
+
+/// Of all limits tried, with the excess of torque reckoned by the balance `terms`, the one that leaves the least unexplained.
+fn clearest(rows: &Rows, plain: &Regression, terms: Terms) -> Option<Limit> {
+    let none = Limit::none(terms);
+    let fastest = rows.blocks.iter().map(|b| b.speed.abs()).fold(0.0, f64::max).min(rows.trusted.speed);
+    let strongest = quantile(rows.blocks, 0.98, |b| b.torque.abs()).min(rows.trusted.torque);
+    let mut tried = [(none, *plain); 1 + 2 * STEPS];
+    for (i, place) in tried.iter_mut().skip(1).enumerate() {
+        let share = LOWEST.powf(1.0 - (i / 2) as f64 / STEPS as f64);
+        let mut limit = if i % 2 == 0 {
+            Limit { speed: share * fastest, ..none }
+        } else {
+            Limit { torque: share * strongest, ..none }
+        };
+        for _ in 0..2 {
+            let Some(found) = (Rows { suspected: Some(limit), ..*rows }).fit() else { break };
+            limit.terms = found.terms;
+            *place = (limit, found);
         }
     }
     // The noise is the least scatter that leaves nearly all blocks in; an outlier counts as four times that.
@@ -232,8 +254,15 @@ fn threshold(rows: &Rows, largest: f64, reported: impl Fn(f64, &Regression) -> R
     let fair = |fit: &Regression| if 5 * fit.dropped <= all { fit.scatter } else { f64::INFINITY };
     let noise = tried.iter().map(|(_, fit)| fair(fit)).fold(f64::INFINITY, f64::min).min(plain.scatter).max(1e-12);
     let loss = |fit: &Regression| fit.used as f64 * (fit.scatter / noise).powi(2) + 16.0 * fit.dropped as f64;
-    let best = tried.iter().fold(&tried[0], |best, next| if loss(&next.1) < loss(&best.1) { next } else { best });
-    if loss(&plain) - loss(&best.1) > EVIDENCE { best.0 } else { 0.0 }
+    let (limit, best) = tried.iter().min_by(|a, b| loss(&a.1).total_cmp(&loss(&b.1)))?;
+    let clear = EVIDENCE.max((SHARE * best.used as f64).sqrt());
+    if best.excess() < clear {
+        return None;
+    }
+    // Of those of its kind that do as well but for chance, the one that leaves most blocks in.
+    let same = |other: &Limit| (other.speed < f64::MAX) == (limit.speed < f64::MAX);
+    let as_well = |fit: &Regression| loss(fit) < loss(best) + NEAR && fit.excess() > clear;
+    tried.iter().rev().find(|(other, fit)| same(other) && as_well(fit)).map(|(limit, _)| *limit)
 }
 
 /// The quantile `share` of a quantity over the blocks.
@@ -277,7 +306,7 @@ fn few_stretches(share: f64) -> f64 {
 
 fn fill(balance: &mut Balance, found: &Regression) {
     let t = student(found.used as f64 - 4.0) * few_stretches(found.lag_share);
-    let value = |i: usize| Value { value: found.terms[i], uncertainty: t * found.covariance[(i, i)].max(0.0).sqrt() };
+    let value = |i: usize| Value { value: found.terms[i], uncertainty: t * found.variance[i].max(0.0).sqrt() };
     balance.inertia = value(0);
     balance.viscous = value(1);
     balance.coulomb = value(2);
@@ -291,7 +320,7 @@ fn fill(balance: &mut Balance, found: &Regression) {
 /// friction, so that var J = S/(2·times·(ω₂ − ω₁)·a), S: density of the torque noise, N²m²·s.
 fn ramp(rows: &Rows, balance: &Balance, length: u32, question: &Question) -> Ramp {
     const TIMES: f64 = 2.0;
-    let top = quantile(rows.blocks, 0.98, |b| b.speed.abs()).min(rows.speed_limit);
+    let top = quantile(rows.blocks, 0.98, |b| b.speed.abs()).min(rows.trusted.speed);
     let span = 0.9 * top;
     let density = balance.scatter.powi(2) * f64::from(length) * question.sample_s / PARABOLA;
     let inertia = balance.inertia.value.abs().max(1e-3 * balance.inertia.uncertainty);
@@ -301,7 +330,7 @@ fn ramp(rows: &Rows, balance: &Balance, length: u32, question: &Question) -> Ram
     // No slower than a quarter of what was seen, no faster than the torque seen allows.
     let seen = quantile(rows.blocks, 0.98, |b| b.acceleration.abs());
     let friction = (balance.coulomb.value + balance.viscous.value * top).max(0.0);
-    let strongest = quantile(rows.blocks, 0.98, |b| b.torque.abs()).min(rows.torque_limit);
+    let strongest = quantile(rows.blocks, 0.98, |b| b.torque.abs()).min(rows.trusted.torque);
     let fastest = ((strongest - friction) / inertia).max(seen);
     let acceleration = (needed / TIMES).max(0.25 * seen).min(fastest);
     let times = (needed / acceleration).ceil().max(TIMES);

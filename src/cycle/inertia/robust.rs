@@ -7,10 +7,16 @@
 //! 1987), since torque ripple does both.
 
 use super::blocks::{BLOCKS, Block};
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{SMatrix, SVector};
 
-/// Terms of the balance: acceleration, speed, sense, constant.
-pub const TERMS: usize = 4;
+/// Terms of the balance: acceleration, speed, sense, constant, and the torque in excess beyond a limit.
+const TERMS: usize = 5;
+/// One number for each term.
+pub type Terms = SVector<f64, TERMS>;
+type Square = SMatrix<f64, TERMS, TERMS>;
+/// Which term is the constant one, and which the excess; both are there only where asked for.
+const CONSTANT: usize = 3;
+const EXCESS: usize = 4;
 /// Residuals beyond this many standard deviations are not chance: 1 in 15 000 if they are normal.
 const FAR: f64 = 4.0;
 /// Standard deviation of a normal distribution over its median absolute deviation.
@@ -18,6 +24,33 @@ const STD_PER_MAD: f64 = 1.482_602_218_505_602;
 /// Tukey's constant for 95 % efficiency on normal residuals.
 const BIWEIGHT: f64 = 4.685;
 const ITERATIONS: usize = 12;
+/// Variance of a change that is not worth another iteration, as a share of the variance.
+const TRIFLE: f64 = 1e-4;
+
+/// A speed and a torque from which on a drive may report more torque than its motor delivers.
+#[derive(Debug, Clone, Copy)]
+pub struct Limit {
+    /// |ω|, rad/s.
+    pub speed: f64,
+    /// |T|, N·m, of the balance `terms`: what is measured holds noise, and to choose by that would favour one sign of it.
+    pub torque: f64,
+    /// That balance.
+    pub terms: Terms,
+}
+
+impl Limit {
+    /// No limit, of a balance.
+    #[must_use]
+    pub fn none(terms: Terms) -> Limit {
+        Limit { speed: f64::MAX, torque: f64::MAX, terms }
+    }
+
+    /// How far a motion is beyond the limit, as a share of it; 0 within. Beside it the torque of the balance.
+    fn beyond(&self, motion: &Terms) -> (f64, f64) {
+        let torque = self.terms.dot(motion);
+        ((motion[1].abs() / self.speed).max(torque.abs() / self.torque).max(1.0) - 1.0, torque)
+    }
+}
 
 /// What the blocks are regressed on, and which of them count.
 #[derive(Debug, Clone, Copy)]
@@ -28,32 +61,20 @@ pub struct Rows<'a> {
     pub both_senses: bool,
     /// Variance of the acceleration's noise, (rad/s²)².
     pub noise: f64,
-    /// Highest |speed| that counts, rad/s.
-    pub speed_limit: f64,
-    /// Highest |torque| that counts, N·m.
-    pub torque_limit: f64,
-    /// How the torque is reported.
-    pub reported: Reported,
-}
-
-/// By which factor a drive may report more torque than the motor delivers.
-#[derive(Debug, Clone, Copy)]
-pub enum Reported {
-    /// As delivered.
-    Truly,
-    /// By |ω|/limit above a speed, rad/s: the field is weakened.
-    Weakened(f64),
-    /// By |T|/limit above a torque, N·m, judged by the balance given: the motor saturates.
-    Saturated(f64, Vector4<f64>),
+    /// What is beyond does not count.
+    pub trusted: Limit,
+    /// Beyond this an excess of torque is fitted too, in proportion to torque and to how far beyond: 1 is what a drive shows
+    /// that reports current × constant.
+    pub suspected: Option<Limit>,
 }
 
 /// A fitted balance.
 #[derive(Debug, Clone, Copy)]
 pub struct Regression {
-    /// J, B, Tc, T0.
-    pub terms: Vector4<f64>,
-    /// Their covariance.
-    pub covariance: Matrix4<f64>,
+    /// J, B, Tc, T0, excess.
+    pub terms: Terms,
+    /// Their variances.
+    pub variance: Terms,
     /// Standard deviation of a block's torque about the fit, N·m.
     pub scatter: f64,
     /// Blocks that the result rests on.
@@ -66,31 +87,43 @@ pub struct Regression {
     pub noise_share: f64,
 }
 
-impl Rows<'_> {
-    /// The regressors of a block.
+impl Regression {
+    /// By how many standard deviations the drive reports more torque beyond the suspected limit than the motor delivers.
     #[must_use]
-    pub fn row(&self, block: &Block) -> Vector4<f64> {
+    pub fn excess(&self) -> f64 {
+        self.terms[EXCESS] / self.variance[EXCESS].max(f64::MIN_POSITIVE).sqrt()
+    }
+}
+
+impl Rows<'_> {
+    /// Acceleration, speed, sense and constant of a block.
+    fn motion(&self, block: &Block) -> Terms {
         let constant = if self.both_senses { 1.0 } else { 0.0 };
-        let row = Vector4::new(block.acceleration, block.speed, block.speed.signum(), constant);
-        match self.reported {
-            Reported::Truly => row,
-            Reported::Weakened(limit) => row * (block.speed.abs() / limit).max(1.0),
-            Reported::Saturated(limit, terms) => row * (terms.dot(&row).abs() / limit).max(1.0),
-        }
+        Terms::new(block.acceleration, block.speed, block.speed.signum(), constant, 0.0)
     }
 
-    /// Whether a block is within the limits.
+    /// The regressors of a block.
+    fn row(&self, block: &Block) -> Terms {
+        let mut row = self.motion(block);
+        if let Some(limit) = &self.suspected {
+            let (share, torque) = limit.beyond(&row);
+            row[EXCESS] = share * torque;
+        }
+        row
+    }
+
+    /// Whether a block is within what is trusted.
     #[must_use]
     pub fn counts(&self, block: &Block) -> bool {
-        block.speed.abs() <= self.speed_limit && block.torque.abs() <= self.torque_limit
+        self.trusted.beyond(&self.motion(block)).0 <= 0.0
     }
 
     fn unknowns(&self) -> usize {
-        if self.both_senses { 4 } else { 3 }
+        CONSTANT + usize::from(self.both_senses) + usize::from(self.suspected.is_some())
     }
 
     /// Residuals of the blocks that count.
-    fn residuals(&self, terms: &Vector4<f64>, out: &mut [f64; BLOCKS]) -> usize {
+    fn residuals(&self, terms: &Terms, out: &mut [f64; BLOCKS]) -> usize {
         let mut n = 0;
         for (block, place) in self.blocks.iter().filter(|b| self.counts(b)).zip(out.iter_mut()) {
             *place = block.torque - terms.dot(&self.row(block));
@@ -100,9 +133,9 @@ impl Rows<'_> {
     }
 
     /// Inverse of the normal matrix and the solution under weights by residual.
-    fn solve(&self, weight: impl Fn(&Block) -> f64) -> Option<(Matrix4<f64>, Vector4<f64>)> {
-        let mut normal = Matrix4::zeros();
-        let mut right = Vector4::zeros();
+    fn solve(&self, weight: impl Fn(&Block) -> f64) -> Option<(Square, Terms)> {
+        let mut normal = Square::zeros();
+        let mut right = Terms::zeros();
         let mut sum = 0.0;
         for block in self.blocks.iter().filter(|b| self.counts(b)) {
             let (row, w) = (self.row(block), weight(block));
@@ -111,8 +144,9 @@ impl Rows<'_> {
             sum += w;
         }
         normal[(0, 0)] -= sum * self.noise;
-        if !self.both_senses {
-            normal[(3, 3)] = 1.0;
+        // A term that is not asked for, or that no block tells of, is nought.
+        for term in CONSTANT..TERMS {
+            normal[(term, term)] += f64::from(u8::from(normal[(term, term)] == 0.0));
         }
         let inverse = inverse(&normal)?;
         Some((inverse, inverse * right))
@@ -123,21 +157,22 @@ impl Rows<'_> {
     pub fn fit(&self) -> Option<Regression> {
         let (_, mut terms) = self.solve(|_| 1.0)?;
         let mut residuals = [0.0; BLOCKS];
-        for round in 0..2 * ITERATIONS {
-            let n = self.residuals(&terms, &mut residuals);
-            if n <= self.unknowns() {
-                return None;
-            }
-            let scale = self.scale(&mut residuals, n);
-            let next = self.solve(|block| {
-                let r = (block.torque - terms.dot(&self.row(block))).abs() / scale;
-                match round {
-                    ..ITERATIONS => 1.0 / r.max(0.1),
-                    _ if r < BIWEIGHT => (1.0 - (r / BIWEIGHT).powi(2)).powi(2),
-                    _ => 0.0,
+        for weight in [absolute_values, biweight] {
+            for _ in 0..ITERATIONS {
+                let n = self.residuals(&terms, &mut residuals);
+                if n <= self.unknowns() {
+                    return None;
                 }
-            });
-            terms = next?.1;
+                let scale = self.scale(&mut residuals, n);
+                let off = |block: &Block| (block.torque - terms.dot(&self.row(block))).abs() / scale;
+                let (inverse, next) = self.solve(|block| weight(off(block)))?;
+                let settled =
+                    (0..TERMS).all(|i| (next[i] - terms[i]).powi(2) <= TRIFLE * scale * scale * inverse[(i, i)]);
+                terms = next;
+                if settled {
+                    break;
+                }
+            }
         }
         let n = self.residuals(&terms, &mut residuals);
         let far = FAR * self.scale(&mut residuals, n);
@@ -166,8 +201,8 @@ impl Rows<'_> {
         let scatter = (squares / freedom).sqrt();
         // Half the lag window that Newey and West give for this many blocks, at least two neighbours.
         let lags = ((4.0 * (used as f64 / 100.0).powf(2.0 / 9.0)) as usize).max(2);
-        let mut meat = Matrix4::zeros();
-        let mut past = [Vector4::zeros(); 16];
+        let mut meat = Square::zeros();
+        let mut past = [Terms::zeros(); 16];
         for (i, block) in counted().enumerate() {
             let score = residual(block) * self.row(block);
             meat += score * score.transpose();
@@ -179,24 +214,33 @@ impl Rows<'_> {
             past[i % past.len()] = score;
         }
         let sandwich = inverse * meat * inverse * (used as f64 / freedom);
-        let plain = inverse * (squares / freedom);
         // A short record can make the sandwich too lucky; it is never believed below plain least squares.
-        let covariance = if sandwich[(0, 0)] > plain[(0, 0)] { sandwich } else { plain };
+        let variance = sandwich.diagonal().sup(&(inverse.diagonal() * (squares / freedom)));
         let free = 1.0 / (inverse[(0, 0)] * used as f64);
         let noise_share = self.noise / (self.noise + free);
         let lag_share = (lags + 1) as f64 / used as f64;
-        Some(Regression { terms, covariance, scatter, used, dropped: n - used, lag_share, noise_share })
+        Some(Regression { terms, variance, scatter, used, dropped: n - used, lag_share, noise_share })
     }
 }
 
+/// Weight of a residual, given in standard deviations, under which least squares become least absolute values.
+fn absolute_values(residual: f64) -> f64 {
+    1.0 / residual.max(0.1)
+}
+
+/// Tukey's weight.
+fn biweight(residual: f64) -> f64 {
+    (1.0 - (residual / BIWEIGHT).powi(2)).max(0.0).powi(2)
+}
+
 /// Inverse of a symmetric positive definite matrix, scaled first; `None` when it is as good as singular.
-fn inverse(normal: &Matrix4<f64>) -> Option<Matrix4<f64>> {
+fn inverse(normal: &Square) -> Option<Square> {
     const SINGULAR: f64 = 1e-10;
     let diagonal = normal.diagonal();
     if !diagonal.iter().all(|d| *d > 0.0 && d.is_finite()) {
         return None;
     }
-    let scale = Matrix4::from_diagonal(&diagonal.map(|d| 1.0 / d.sqrt()));
+    let scale = Square::from_diagonal(&diagonal.map(|d| 1.0 / d.sqrt()));
     let cholesky = (scale * normal * scale).cholesky()?;
     let smallest = cholesky.l().diagonal().min();
     (smallest * smallest > SINGULAR).then(|| scale * cholesky.inverse() * scale)
@@ -207,14 +251,7 @@ mod tests {
     use super::*;
 
     fn rows(blocks: &[Block]) -> Rows<'_> {
-        Rows {
-            blocks,
-            both_senses: false,
-            noise: 0.0,
-            speed_limit: f64::MAX,
-            torque_limit: f64::MAX,
-            reported: Reported::Truly,
-        }
+        Rows { blocks, both_senses: false, noise: 0.0, trusted: Limit::none(Terms::zeros()), suspected: None }
     }
 
     fn exact(j: f64, b: f64, tc: f64) -> Vec<Block> {
@@ -229,7 +266,7 @@ mod tests {
     fn exact_blocks_give_exact_terms() {
         let blocks = exact(0.3, 0.02, 4.0);
         let fit = rows(&blocks).fit().unwrap();
-        assert!((fit.terms - Vector4::new(0.3, 0.02, 4.0, 0.0)).norm() < 1e-9, "{:?}", fit.terms);
+        assert!((fit.terms - Terms::new(0.3, 0.02, 4.0, 0.0, 0.0)).norm() < 1e-9, "{:?}", fit.terms);
         assert!(fit.scatter < 1e-9 && fit.dropped == 0);
     }
 
