@@ -1,5 +1,6 @@
 /*
- * Recorders under callgrind: rows of 1, 12 and 24 channels, and cycles between two rows. See count_backlash.c.
+ * Recorders under callgrind: rows of 1, 12 and 24 channels from one array and from scattered places, and cycles between two
+ * rows. See count_backlash.c.
  */
 #include "gib.h"
 
@@ -12,9 +13,11 @@ static int count(uint32_t channels, uint32_t every, const char *label, const cha
 {
     char name[32], columns[512] = "";
     double values[24];
+    const double *sources[24];
     for (uint32_t i = 0; i < channels; i++) {
         snprintf(columns + strlen(columns), sizeof columns - strlen(columns), "%sc%u.position_mm", i ? "," : "", i);
         values[i] = 0.25 * i;
+        sources[i] = &values[i];
     }
     snprintf(name, sizeof name, "count-%d", (int)getpid());
     gib_recorder_config config = {.struct_size = sizeof config,
@@ -34,6 +37,13 @@ static int count(uint32_t channels, uint32_t every, const char *label, const cha
         CALLGRIND_ZERO_STATS;
         gib_recorder_step(gib, values, channels);
         CALLGRIND_DUMP_STATS_AT(i % every ? between : label);
+    }
+    for (uint32_t i = 0; every == 1 && i < 60; i++) {
+        char scattered[32];
+        snprintf(scattered, sizeof scattered, "%s scattered", label);
+        CALLGRIND_ZERO_STATS;
+        gib_recorder_step_from(gib, sources, channels);
+        CALLGRIND_DUMP_STATS_AT(scattered);
     }
     gib_recorder_abort(gib);
     for (int i = 0; i < 5; i++) {

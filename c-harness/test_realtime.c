@@ -180,10 +180,14 @@ static void recorder_prepare(void)
 static int32_t recorder_cycle(void)
 {
     uint64_t n = recorder.cycle++, i = n / 250 % 4;
+    const double *sources[12];
     for (int k = 0; k < 12; k++) {
         recorder.outputs[k] = (double)n + 0.5 * k;
+        sources[k] = &recorder.outputs[k];
     }
-    int32_t status = gib_recorder_step(recorder.gib[i], recorder.outputs, n % 97 ? 12 : 11);
+    uint32_t channels = n % 97 ? 12 : 11;
+    int32_t status = n & 1 ? gib_recorder_step(recorder.gib[i], recorder.outputs, channels)
+                           : gib_recorder_step_from(recorder.gib[i], sources, channels);
     if (n == 900000) {
         gib_recorder_abort(recorder.gib[1]);
     }

@@ -121,6 +121,50 @@ static void memory_is_as_documented(void **state)
     assert_int_equal(report.rows, 0);
 }
 
+/* From their own addresses the values come as they are at each cycle, and as many as there are channels. */
+static void scattered_values_are_read_where_they_are(void **state)
+{
+    fixture *f = *state;
+    for (uint32_t channels = 1; channels <= 64; channels++) {
+        char columns[512] = "";
+        double values[64];
+        const double *sources[64];
+        struct stat meta;
+        for (uint32_t i = 0; i < channels; i++) {
+            snprintf(columns + strlen(columns), sizeof columns - strlen(columns), "%sc%u", i ? "," : "", i);
+            sources[i] = &values[channels - 1 - i];
+        }
+        f->config.channels = channels;
+        f->config.columns = columns;
+        assert_int_equal(gib_recorder_start(f->gib, &f->config), GIB_OK);
+        for (int n = 0; n < 5; n++) {
+            for (uint32_t i = 0; i < channels; i++) {
+                values[i] = 100.0 * n + i;
+            }
+            assert_int_equal(gib_recorder_step_from(f->gib, sources, channels), GIB_BUSY);
+        }
+        assert_int_equal(gib_recorder_step_from(f->gib, sources, channels + 1), GIB_ERR_RECORDER_COUNT);
+        assert_int_equal(gib_recorder_step_from(f->gib, NULL, channels), GIB_ERR_NULL);
+        assert_int_equal(gib_recorder_step_from(NULL, sources, channels), GIB_ERR_NULL);
+        const uint64_t *words = look(f, &meta);
+        assert_non_null(words);
+        assert_int_equal(words[16], 5);
+        uint64_t row_words = ((uint64_t)meta.st_size / 8 - 512) / 16;
+        for (uint64_t n = 0; n < 5; n++) {
+            const uint64_t *row = words + 512 + n * row_words;
+            assert_int_equal(row[0], n);
+            for (uint32_t i = 0; i < channels; i++) {
+                assert_float_equal(number(row[1 + i]), 100.0 * n + (channels - 1 - i), 0.0);
+            }
+        }
+        munmap((void *)words, (size_t)meta.st_size);
+        assert_int_equal(gib_recorder_abort(f->gib), GIB_OK);
+        assert_int_equal(gib_recorder_step_from(f->gib, sources, channels), GIB_ERR_ABORTED);
+        assert_int_equal(gib_recorder_close(f->gib), GIB_OK);
+        assert_int_equal(gib_recorder_step_from(f->gib, sources, channels), GIB_OK);
+    }
+}
+
 static void refused(fixture *f, gib_recorder_config config, int32_t code, const char *field)
 {
     gib_error_detail detail;
@@ -247,6 +291,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(memory_is_as_documented, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(scattered_values_are_read_where_they_are, set_up, tear_down),
         cmocka_unit_test_setup_teardown(every_refusal, set_up, tear_down),
         cmocka_unit_test_setup_teardown(one_writer_a_name, set_up, tear_down),
         cmocka_unit_test_setup_teardown(a_dead_writer_is_cleared_away, set_up, tear_down),

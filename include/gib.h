@@ -4415,6 +4415,10 @@ typedef struct gib_api_table {
      * See gib_learning_last_error.
      */
     int32_t (*learning_last_error)(const struct gib_learning *handle, struct gib_error_detail *detail);
+    /**
+     * See gib_recorder_step_from.
+     */
+    int32_t (*recorder_step_from)(struct gib_recorder *handle, const double *const *sources, uint32_t count);
 } gib_api_table;
 
 #ifdef __cplusplus
@@ -5783,6 +5787,25 @@ int32_t gib_recorder_start(struct gib_recorder *handle,
 int32_t gib_recorder_step(struct gib_recorder *handle,
                           const double *values,
                           uint32_t count);
+
+/**
+ * One servo cycle, as `gib_recorder_step`, of values that lie scattered: each is read from its own address, once, when a row
+ * is due. Saves a kernel that keeps its signals in places of their own, such as LinuxCNC's pins, to gather them first.
+ *
+ * @param handle the instance.
+ * @param sources where the number of each channel lies now, in the order of the columns; none is NULL. A NaN or an infinity
+ * is recorded as an empty cell. Read during this call only.
+ * @param count addresses at `sources`; must be `channels`.
+ * @return as `gib_recorder_step`.
+ *
+ * [thread: cycle] [real-time: yes] [state: any]
+ *
+ * # Safety
+ * `handle` is NULL or an instance; `sources` is NULL or points to `count` addresses of readable numbers.
+ */
+int32_t gib_recorder_step_from(struct gib_recorder *handle,
+                               const double *const *sources,
+                               uint32_t count);
 
 /**
  * Ends the recording: no row is written any more, and readers end by themselves once they have all. Does nothing at rest.

@@ -125,8 +125,8 @@ static void report_it(struct __comp_state *__comp_inst, int32_t status)
     error = status == GIB_DONE ? 0 : status;
 }
 
-/* A cycle in which something is asked for, or goes on. Apart, so that the usual one costs little. */
-__attribute__((noinline, cold)) static void work(struct __comp_state *__comp_inst, long period)
+/* A cycle in which something is asked for, or goes on. */
+static void work(struct __comp_state *__comp_inst, long period)
 {
     int32_t status;
     if (start && !started && enable && !busy && !fault) {
@@ -184,20 +184,32 @@ __attribute__((noinline, cold)) static void work(struct __comp_state *__comp_ins
     awake = start || restore || running || owed || busy || back != 0.0;
 }
 
-FUNCTION(_)
+/* A cycle that is not as usual: a fault, the machine off, or work. */
+__attribute__((noinline, cold)) static void any(struct __comp_state *__comp_inst, int good, long period)
 {
-    if (!enable) {
-        fault = 0;
-    }
-    /* What is no number goes nowhere: the last safe value stays, and motion is told. */
-    fault = gib_hal_held(drive_fb, &drive_safe) && gib_hal_held(position_cmd, &cmd_safe) ? fault : GIB_ERR_NON_FINITE;
-    if (awake | start | restore) {
+    fault = !good ? GIB_ERR_NON_FINITE : enable ? fault : 0;
+    if (awake || start || restore) {
         work(__comp_inst, period);
     } else {
         drive_cmd = cmd_safe;
         position_fb = drive_safe;
     }
-    compensation = amount;
-    active = fabs(2.0 * fabs(backlash_corr) - amount) < 1e-6;
     ok = ok_in && !fault;
+}
+
+FUNCTION(_)
+{
+    double cmd = position_cmd, fb = drive_fb, now;
+    /* What is no number goes nowhere: the last safe value stays, and motion is told. */
+    int good = gib_hal_both_held(cmd, fb, &cmd_safe, &drive_safe);
+    if (!good | !enable | start | restore | awake | fault) {
+        any(__comp_inst, good, period);
+    } else {
+        drive_cmd = cmd;
+        position_fb = fb;
+        ok = ok_in;
+    }
+    now = amount;
+    compensation = now;
+    active = fabs(2.0 * fabs(backlash_corr) - now) < 1e-6;
 }

@@ -58,6 +58,7 @@ variable int owned = 0;
 variable int fault = 0;
 variable int stop = 0; /* gib wants the torque off the motor */
 variable int awake = 0; /* homing goes on, or did in the last cycle */
+variable int unusual = 1; /* the next cycle must look at all of this */
 
 option extra_setup yes;
 option extra_cleanup yes;
@@ -107,8 +108,8 @@ static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
     return gib_homing_start(gib, &config);
 }
 
-/* A cycle of homing, or of what follows it. Apart, so that the usual one costs little. */
-__attribute__((noinline, cold)) static void work(struct __comp_state *__comp_inst, long period)
+/* A cycle of homing, or of what follows it. */
+static void work(struct __comp_state *__comp_inst, long period)
 {
     gib_homing_report report;
     int32_t status;
@@ -154,19 +155,39 @@ __attribute__((noinline, cold)) static void work(struct __comp_state *__comp_ins
     awake = busy || owned || index_enable;
 }
 
-FUNCTION(_)
+/* The torque limit that the drive shall have: what gib last asked for. */
+static double limit(struct __comp_state *__comp_inst)
 {
-    if (!enable) {
-        fault = stop = 0;
-    }
-    /* What is no number goes nowhere: the last safe value stays, and motion is told. */
-    fault = gib_hal_held(drive_fb, &drive_safe) && gib_hal_held(position_cmd, &cmd_safe) ? fault : GIB_ERR_NON_FINITE;
-    if (awake | index_enable) {
+    return out.request_id ? out.torque_limit : torque_limit_normal;
+}
+
+/* A cycle that is not as usual: a fault, the machine off, or work. */
+__attribute__((noinline, cold)) static void any(struct __comp_state *__comp_inst, int good, long period)
+{
+    fault = !good ? GIB_ERR_NON_FINITE : enable ? fault : 0;
+    stop = enable ? stop : 0;
+    if (awake || index_enable) {
         work(__comp_inst, period);
     } else {
         drive_cmd = cmd_safe - offset;
         position_fb = drive_safe + offset;
     }
-    torque_limit_cmd = out.request_id ? out.torque_limit : torque_limit_normal;
+    torque_limit_cmd = limit(__comp_inst);
     ok = ok_in && !(fault | stop);
+    unusual = awake | fault | stop;
+}
+
+FUNCTION(_)
+{
+    double cmd = position_cmd, fb = drive_fb;
+    /* What is no number goes nowhere: the last safe value stays, and motion is told. */
+    int good = gib_hal_both_held(cmd, fb, &cmd_safe, &drive_safe);
+    if (!good | !enable | index_enable | unusual) {
+        any(__comp_inst, good, period);
+    } else {
+        drive_cmd = cmd - offset;
+        position_fb = fb + offset;
+        torque_limit_cmd = limit(__comp_inst);
+        ok = ok_in;
+    }
 }

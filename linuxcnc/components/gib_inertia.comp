@@ -173,34 +173,45 @@ __attribute__((noinline, cold)) static void wait_to_vary(struct __comp_state *__
     }
 }
 
+/* The variation has ended. */
+__attribute__((noinline, cold)) static void end_of_variation(struct __comp_state *__comp_inst)
+{
+    swinging = 0;
+    varying = 0;
+    torque_ff = amplitude_now = 0.0;
+}
+
 /* One cycle of the variation: the speed to be commanded. A stop is a stop, whatever is still to be wound down. */
 static double varied(struct __comp_state *__comp_inst, double wanted)
 {
-    int go_on = vary && enable && !fault && wanted != 0.0 && ina > 0.0;
+    int go_on = vary & enable & !fault & (wanted != 0.0) & (ina > 0.0);
     gib_speed_variation_input in = {
         .speed_rpm = wanted,
         .amplitude_ratio = amplitude,
         .period_s = swing_time,
+        .cutting_nm = 0.0,
         .flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (go_on ? 0 : GIB_SPEED_VARIATION_STOP),
+        .reserved = 0,
     };
-    swinging = gib_speed_variation_step(variation, &in, &swing) == GIB_BUSY;
-    varying = swinging;
+    int32_t status = gib_speed_variation_step(variation, &in, &swing);
     vary_message = swing.message;
     amplitude_most = swing.amplitude_limit_ratio;
-    torque_ff = swinging ? swing.torque_nm : 0.0;
-    amplitude_now = swinging ? swing.amplitude_ratio : 0.0;
-    return swinging && wanted != 0.0 ? swing.speed_command_rpm : wanted;
+    if (status != GIB_BUSY) {
+        end_of_variation(__comp_inst);
+        return wanted;
+    }
+    torque_ff = swing.torque_nm;
+    amplitude_now = swing.amplitude_ratio;
+    return wanted != 0.0 ? swing.speed_command_rpm : wanted;
 }
 
 FUNCTION(_)
 {
     double wanted;
-    if (!enable) {
-        fault = 0;
-    }
     /* What is no number goes nowhere: the last safe value stays, and motion is told. */
-    if (!gib_hal_held(speed_cmd, &speed_safe) || !isfinite(drive_speed)) {
-        fault = GIB_ERR_NON_FINITE;
+    int good = gib_hal_held(speed_cmd, &speed_safe) & isfinite(drive_speed);
+    if (!good | !enable | fault) {
+        fault = !good ? GIB_ERR_NON_FINITE : enable ? fault : 0;
     }
     wanted = speed_safe;
     if ((measure | measured | running) && measuring(__comp_inst, period * 1e-9)) {
@@ -215,5 +226,5 @@ FUNCTION(_)
         started = swinging || (started && vary && wanted != 0.0);
     }
     drive_speed_cmd = enable ? wanted : 0.0;
-    ok = ok_in && !fault;
+    ok = ok_in & !fault;
 }

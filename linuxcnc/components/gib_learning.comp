@@ -45,6 +45,10 @@ param rw s32 settling = 0 "turns to settle after a change; as many as gib_vibrat
 param rw float lag = 0 "of the servo, s";
 
 variable gib_learning *gib;
+variable gib_learning_output out;
+variable int told_status = 0; /* what the pins say */
+variable int told_phase = 0;
+variable unsigned told_reasons = 0;
 variable double cmd_safe = 0.0;
 variable double fb_safe = 0.0;
 variable double shift = 0.0; /* the correction, mm */
@@ -89,38 +93,40 @@ static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
     return gib_learning_start(gib, &config);
 }
 
-/* How far learning has come. */
-__attribute__((noinline, cold)) static void show(struct __comp_state *__comp_inst)
+/* Tells what has changed, and how far learning has come. */
+__attribute__((noinline, cold)) static void tell(struct __comp_state *__comp_inst, int32_t status)
 {
     gib_learning_report report;
     gib_learning_result(gib, &report);
     deviation = report.last_um;
     first = report.first_um;
     update_count = report.updates;
+    told_status = status;
+    state = told_phase = out.phase;
+    why = told_reasons = out.reasons;
+    done = status == GIB_DONE;
+    error = status < 0 && status != GIB_ERR_ABORTED ? status : 0;
+    /* What was learnt stays in force at the end of these. */
+    awake = status == GIB_BUSY || status == GIB_DONE || status == GIB_ERR_LEARNING_GROWS || status == GIB_ERR_LEARNING_UPDATES;
+    busy = awake;
 }
 
-/* One cycle of learning, or of fading out. */
-static void learn(struct __comp_state *__comp_inst)
+/* One cycle of learning, or of what is left of it. */
+static void learn(struct __comp_state *__comp_inst, unsigned flags)
 {
     gib_learning_input in = {
         .target_mm = cmd_safe,
         .detected_mm = valid ? detected : NAN,
         .angle_deg = angle,
-        .flags = (drive_fault || fault ? GIB_INPUT_FAULT : 0) | (on && enable ? 0 : GIB_INPUT_ABORT),
+        .flags = flags,
+        .reserved = 0,
     };
-    gib_learning_output out;
     int32_t status = gib_learning_step(gib, &in, &out);
     correction = out.correction_um;
     shift = 1e-3 * out.correction_um;
-    why = out.reasons;
-    if (out.phase != state) {
-        state = out.phase;
-        show(__comp_inst);
+    if ((status ^ told_status) | (out.phase ^ told_phase) | (int)(out.reasons ^ told_reasons)) {
+        tell(__comp_inst, status);
     }
-    done = status == GIB_DONE;
-    awake = status == GIB_BUSY || shift != 0.0;
-    busy = awake;
-    error = status < 0 && status != GIB_ERR_ABORTED ? status : 0;
 }
 
 /* Nothing is in force, and something may be asked for. */
@@ -138,16 +144,18 @@ __attribute__((noinline, cold)) static void ask(struct __comp_state *__comp_inst
 FUNCTION(_)
 {
     /* What is no number goes nowhere: the last safe value stays, and motion is told. */
-    if (!enable) {
-        fault = 0;
+    int good = gib_hal_both_held(position_cmd, drive_fb, &cmd_safe, &fb_safe);
+    unsigned flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (on ? 0 : GIB_INPUT_ABORT);
+    if (!good | !enable | fault) {
+        fault = !good ? GIB_ERR_NON_FINITE : enable ? fault : 0;
+        flags |= (fault ? GIB_INPUT_FAULT : 0) | (enable ? 0 : GIB_INPUT_ABORT);
     }
-    fault = gib_hal_held(position_cmd, &cmd_safe) && gib_hal_held(drive_fb, &fb_safe) ? fault : GIB_ERR_NON_FINITE;
     if (awake) {
-        learn(__comp_inst);
+        learn(__comp_inst, flags);
     } else if (on | asked) {
         ask(__comp_inst, period);
     }
     drive_cmd = cmd_safe + shift;
     position_fb = fb_safe - shift;
-    ok = ok_in && !fault;
+    ok = ok_in & !fault;
 }

@@ -12,6 +12,7 @@ period in ns (1000000), \\fBevery\\fR, servo cycles from row to row (1), \\fBrow
 permissions in decimal (384, which is 0600).
 """;
 include "gib.h";
+include "gib_hal.h";
 
 pin in float ch_##[32] "values of the columns, each in the unit of its name";
 pin out bit recording = false "rows are written";
@@ -45,6 +46,7 @@ RTAPI_MP_INT(rows_in_ring, "rows in the ring");
 RTAPI_MP_INT(mode, "permissions, decimal");
 
 static gib_recorder *recorder;
+static int32_t told; /* what the pins say */
 static uint32_t channels;
 
 EXTRA_SETUP()
@@ -89,22 +91,16 @@ EXTRA_CLEANUP()
     gib_recorder_free(recorder);
 }
 
-/* LinuxCNC builds for size, and this loop is most of what a row costs. ch[i] is what ch(i) reads, without its sum with 0. */
-__attribute__((optimize("O2", "unroll-loops"))) static void gather(struct __comp_state *__comp_inst, double *values)
-{
-    uint32_t i, n = channels;
-    for (i = 0; i < n; i++) {
-        values[i] = *__comp_inst->ch[i];
-    }
-}
-
 FUNCTION(_)
 {
-    double values[CHANNELS_MOST];
-    int32_t status;
-    gather(__comp_inst, values);
-    status = gib_recorder_step(recorder, values, channels);
-    recording = status == GIB_BUSY;
-    error = status < 0 ? status : 0;
-    rows = status == GIB_BUSY ? rows + 1 : rows;
+    /* gib reads where the pins are; they are plain numbers. */
+    int32_t status = gib_recorder_step_from(recorder, (const double *const *)__comp_inst->ch, channels);
+    if (status == GIB_BUSY) {
+        rows += 1.0;
+    }
+    if (status != told) {
+        told = status;
+        recording = status == GIB_BUSY;
+        error = status < 0 ? status : 0;
+    }
 }

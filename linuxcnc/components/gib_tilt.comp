@@ -54,6 +54,7 @@ param rw float offset_most = 0 "largest offset of z, mm";
 
 variable gib_tilt *gib;
 variable gib_tilt_output out;
+variable int told_phase = 0; /* what the pins say */
 variable double cmd_safe = 0.0;
 variable double fb_safe = 0.0;
 variable double shift = 0.0; /* z's offset, mm */
@@ -110,8 +111,8 @@ static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
     return gib_tilt_start(gib, &config, &table);
 }
 
-/* What the measurement found, once it is evaluated. */
-static void show(struct __comp_state *__comp_inst)
+/* Tells what has changed, and what the measurement found, once it is evaluated. */
+__attribute__((noinline, cold)) static void tell(struct __comp_state *__comp_inst, int32_t status)
 {
     gib_tilt_report report;
     if (gib_tilt_result(gib, &report) == GIB_OK) {
@@ -119,32 +120,32 @@ static void show(struct __comp_state *__comp_inst)
         uncertainty = report.uncertainty_deg;
         verdict = report.decision;
     }
+    state = told_phase = out.phase;
+    active = out.phase == GIB_TILT_ACTIVE;
+    warn = out.warning;
+    awake = status == GIB_BUSY;
+    busy = awake;
+    error = status < 0 ? status : 0;
+    fault = status == GIB_ERR_NON_FINITE ? status : fault;
 }
 
 /* One cycle of a measurement, or of an offset that comes, stays or goes. */
-__attribute__((noinline)) static void work(struct __comp_state *__comp_inst)
+static void work(struct __comp_state *__comp_inst)
 {
     gib_tilt_input in = {
         .position_mm = {x, y, z},
+        .rotary_deg = {0.0, 0.0, 0.0},
         .load = spindle_load,
         .speed_rpm = speed,
         .acknowledged_id = accepted,
         .flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (cutting ? GIB_TILT_INPUT_CUTTING : 0) |
                  (finish ? GIB_TILT_INPUT_END : 0) | (off ? GIB_TILT_INPUT_OFF : 0),
     };
-    int before = out.phase;
     int32_t status = gib_tilt_step(gib, &in, &out);
     accepted = accept ? out.request_id : accepted;
-    awake = status == GIB_BUSY;
-    busy = awake;
-    if (out.phase != before) {
-        show(__comp_inst);
-        error = status < 0 ? status : 0;
-        fault = status == GIB_ERR_NON_FINITE ? status : fault;
+    if ((status ^ GIB_BUSY) | (out.phase ^ told_phase)) {
+        tell(__comp_inst, status);
     }
-    warn = out.warning;
-    active = out.phase == GIB_TILT_ACTIVE;
-    state = out.phase;
     offset_z = shift = out.offset_mm[2];
 }
 
@@ -162,11 +163,11 @@ __attribute__((noinline, cold)) static void ask(struct __comp_state *__comp_inst
 
 FUNCTION(_)
 {
-    if (!enable) {
-        fault = 0;
-    }
     /* What is no number goes nowhere: the last safe value stays, and motion is told. */
-    fault = gib_hal_held(position_cmd, &cmd_safe) && gib_hal_held(drive_fb, &fb_safe) ? fault : GIB_ERR_NON_FINITE;
+    int good = gib_hal_both_held(position_cmd, drive_fb, &cmd_safe, &fb_safe);
+    if (!good | !enable | fault) {
+        fault = !good ? GIB_ERR_NON_FINITE : enable ? fault : 0;
+    }
     if (start | started) {
         ask(__comp_inst, period);
     }
@@ -175,5 +176,5 @@ FUNCTION(_)
     }
     drive_cmd = cmd_safe + shift;
     position_fb = fb_safe - shift;
-    ok = ok_in && !fault;
+    ok = ok_in & !fault;
 }

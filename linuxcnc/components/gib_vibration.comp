@@ -31,6 +31,10 @@ param rw s32 harmonic_count = 0 "harmonics of a turn that are tracked";
 param rw float averaging = 0 "turns over which they are averaged";
 
 variable gib_vibration *gib;
+variable gib_vibration_output out;
+variable int told_phase = 0; /* what the pins say */
+variable unsigned told_reasons = 0;
+variable double told_blend = 0.0;
 variable double safe = 0.0;
 variable int asked = 0;
 variable int running = 0;
@@ -68,25 +72,34 @@ static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
     return gib_vibration_start(gib, &config, NULL);
 }
 
+/* Tells what has changed. */
+__attribute__((noinline, cold)) static void tell(struct __comp_state *__comp_inst, int32_t status)
+{
+    running = status == GIB_BUSY;
+    error = running || status == GIB_ERR_ABORTED ? 0 : status;
+    state = told_phase = out.phase;
+    why = told_reasons = out.reasons;
+    blend = told_blend = out.blend_ratio;
+    in_force = out.blend_ratio == 1.0;
+}
+
 /* A cycle in which the correction is in force, comes or goes. */
 static void work(struct __comp_state *__comp_inst)
 {
     gib_vibration_input in = {
         .scale_mm = scale,
+        .second_slide_mm = 0.0,
         .angle_deg = angle,
         .acceleration_m_s2 = {seat, bearing},
         .flags = on ? 0 : GIB_INPUT_ABORT,
+        .reserved = 0,
     };
-    gib_vibration_output out;
     int32_t status = gib_vibration_step(gib, &in, &out);
-    running = status == GIB_BUSY;
-    error = running || status == GIB_ERR_ABORTED ? 0 : status;
     position = out.position_mm;
     correction = out.correction_um;
-    blend = out.blend_ratio;
-    in_force = out.blend_ratio == 1.0;
-    state = out.phase;
-    why = out.reasons;
+    if ((status ^ GIB_BUSY) | (out.phase ^ told_phase) | (int)(out.reasons ^ told_reasons) || out.blend_ratio != told_blend) {
+        tell(__comp_inst, status);
+    }
 }
 
 /* Nothing is in force, and something may be asked for. */
@@ -97,7 +110,7 @@ __attribute__((noinline, cold)) static void ask(struct __comp_state *__comp_inst
         running = error == GIB_OK;
     }
     asked = on;
-    correction = blend = 0.0;
+    correction = blend = told_blend = 0.0;
     in_force = 0;
 }
 
@@ -106,12 +119,11 @@ FUNCTION(_)
     int good = gib_hal_held(scale, &safe);
     if (running) {
         work(__comp_inst);
-    } else if (on | asked) {
-        ask(__comp_inst, period);
-    }
-    if (!running || !good) {
+    } else {
+        if (on | asked) {
+            ask(__comp_inst, period);
+        }
         position = safe;
-        in_force = 0;
     }
-    ok = ok_in && good;
+    ok = ok_in & good;
 }

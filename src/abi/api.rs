@@ -383,4 +383,8 @@ pub struct GibApiTable {
     pub learning_load: unsafe extern "C" fn(handle: *mut GibLearning, path: *const c_char) -> i32,
     /// See gib_learning_last_error.
     pub learning_last_error: unsafe extern "C" fn(handle: *const GibLearning, detail: *mut GibErrorDetail) -> i32,
+
+    /// See gib_recorder_step_from.
+    pub recorder_step_from:
+        unsafe extern "C" fn(handle: *mut GibRecorder, sources: *const *const f64, count: u32) -> i32,
 }

@@ -154,6 +154,8 @@ static API: GibApiTable = GibApiTable {
     learning_save: gib_learning_save,
     learning_load: gib_learning_load,
     learning_last_error: gib_learning_last_error,
+
+    recorder_step_from: gib_recorder_step_from,
 };
 
 /// The table of all functions, so that `dlsym` needs one name: "gib_api".

@@ -12,12 +12,12 @@ use crate::machine::learning;
 use core::ffi::{c_char, c_void};
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
-const ALIVE: u64 = 0x6769_625f_6c65_0001;
+const ALIVE: u32 = 0x6769_6c01;
 
 /// The learnt command of one axis. Opaque; its size is `gib_learning_size()`.
 #[repr(C, align(16))]
 pub struct GibLearning {
-    alive: u64,
+    alive: u32,
     last: Fault,
     machine: Learning,
 }
@@ -44,7 +44,7 @@ impl GibLearning {
 
 /// Bytes that an instance needs in memory of your own, to be aligned to 16.
 ///
-/// @return the size in bytes, about 50 KiB.
+/// @return the size in bytes, about 80 KiB.
 ///
 /// [thread: any] [real-time: yes] [state: any]
 #[unsafe(no_mangle)]

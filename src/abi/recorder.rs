@@ -263,17 +263,48 @@ pub unsafe extern "C" fn gib_recorder_start(handle: *mut GibRecorder, config: *c
 /// `handle` is NULL or an instance; `values` is NULL or points to `count` readable numbers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn gib_recorder_step(handle: *mut GibRecorder, values: *const f64, count: u32) -> i32 {
+    // SAFETY: `count` readable numbers by the caller's promise.
+    unsafe { step(handle, values.is_null(), count, |i| values.add(i).read()) }
+}
+
+/// One servo cycle, as `gib_recorder_step`, of values that lie scattered: each is read from its own address, once, when a row
+/// is due. Saves a kernel that keeps its signals in places of their own, such as LinuxCNC's pins, to gather them first.
+///
+/// @param handle the instance.
+/// @param sources where the number of each channel lies now, in the order of the columns; none is NULL. A NaN or an infinity
+/// is recorded as an empty cell. Read during this call only.
+/// @param count addresses at `sources`; must be `channels`.
+/// @return as `gib_recorder_step`.
+///
+/// [thread: cycle] [real-time: yes] [state: any]
+///
+/// # Safety
+/// `handle` is NULL or an instance; `sources` is NULL or points to `count` addresses of readable numbers.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn gib_recorder_step_from(
+    handle: *mut GibRecorder,
+    sources: *const *const f64,
+    count: u32,
+) -> i32 {
+    // SAFETY: `count` addresses of readable numbers by the caller's promise. Read once, for others may write there meanwhile.
+    unsafe { step(handle, sources.is_null(), count, |i| sources.add(i).read().read_volatile()) }
+}
+
+/// One servo cycle with the values that `value` knows, if there are any.
+///
+/// # Safety
+/// `handle` is NULL or an instance; `value` can be asked for each number below `count` unless there are none.
+#[inline(always)]
+unsafe fn step(handle: *mut GibRecorder, none: bool, count: u32, value: impl Fn(usize) -> f64) -> i32 {
     // SAFETY: the caller promises NULL or an instance.
     let Some(handle) = (unsafe { handle.as_mut() }) else { return GIB_ERR_NULL };
-    if handle.alive != RECORDING || count != handle.plan.channels || values.is_null() {
-        return handle.why_no_row(values.is_null());
+    if handle.alive != RECORDING || count != handle.plan.channels || none {
+        return handle.why_no_row(none);
     }
     // SAFETY: the mark is RECORDING only while there is a memory.
     let memory = unsafe { handle.memory.as_ref().unwrap_unchecked() };
-    // SAFETY: not NULL, and `count` readable numbers by the caller's promise.
-    let values = unsafe { core::slice::from_raw_parts(values, count as usize) };
     // SAFETY: the plan is of the memory's own shape, so that each of its places has room for a row of `channels`.
-    let row = |place: usize, number: u64| unsafe { memory.put_row(place, number, values) };
+    let row = |place: usize, number: u64| unsafe { memory.put_row(place, number, count as usize, value) };
     // SAFETY: every mapping has a header.
     writer::step(&handle.plan, &mut handle.state, row, |rows| unsafe { memory.release(HEAD, rows) });
     GIB_BUSY

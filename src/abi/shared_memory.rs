@@ -44,18 +44,18 @@ impl SharedMemory {
         unsafe { core::slice::from_raw_parts(self.start, self.words) }
     }
 
-    /// Writes a row: its number, then its values. For the cycle: without a check.
+    /// Writes a row: its number, then `count` values, each of which `value` knows. For the cycle: without a check.
     ///
     /// # Safety
-    /// `place + 1 + values.len()` is not above the words of the mapping.
+    /// `place + 1 + count` is not above the words of the mapping.
     #[inline(always)]
-    pub unsafe fn put_row(&self, place: usize, number: u64, values: &[f64]) {
+    pub unsafe fn put_row(&self, place: usize, number: u64, count: usize, value: impl Fn(usize) -> f64) {
         // SAFETY: inside the mapping by the caller's promise, which outlives the call and which this process never reads.
         // Another process copies while this writes, and sees by the head which of what it has copied was whole.
         unsafe {
             let row = self.start.cast_mut().cast::<u64>().add(place);
             row.write(number);
-            copy(values, row.add(1).cast::<f64>());
+            write(count, value, row.add(1).cast::<f64>());
         }
     }
 
@@ -79,43 +79,41 @@ impl SharedMemory {
     }
 }
 
-/// Copies values in pieces of a fixed size, each a few instructions without a loop: so many channels are not worth more.
+/// Writes values in pieces of a fixed size, each a few instructions without a loop: so many channels are not worth more.
 ///
 /// # Safety
-/// `to` has room for all of `values`, and nobody else in this process uses it.
+/// `to` has room for `count` values, and nobody else in this process uses it.
 #[inline(always)]
-unsafe fn copy(values: &[f64], to: *mut f64) {
-    // SAFETY: each piece is within `values` and its room, since the pieces add up to its length.
+unsafe fn write(count: usize, value: impl Fn(usize) -> f64, to: *mut f64) {
+    // SAFETY: each piece is within the room, since the pieces add up to `count`.
     unsafe {
-        let (mut from, mut to, mut left) = (values.as_ptr(), to, values.len());
-        while left >= 16 {
-            piece::<16>(&mut from, &mut to);
-            left -= 16;
+        let mut at = 0;
+        while count - at >= 16 {
+            at = piece::<16>(at, &value, to);
         }
-        if left & 8 != 0 {
-            piece::<8>(&mut from, &mut to);
+        if count & 8 != 0 {
+            at = piece::<8>(at, &value, to);
         }
-        if left & 4 != 0 {
-            piece::<4>(&mut from, &mut to);
+        if count & 4 != 0 {
+            at = piece::<4>(at, &value, to);
         }
-        if left & 2 != 0 {
-            piece::<2>(&mut from, &mut to);
+        if count & 2 != 0 {
+            at = piece::<2>(at, &value, to);
         }
-        if left & 1 != 0 {
-            piece::<1>(&mut from, &mut to);
+        if count & 1 != 0 {
+            piece::<1>(at, &value, to);
         }
     }
 }
 
-/// Copies `N` values and goes on behind them.
+/// Writes `N` values from the one at `at` on; the place behind them.
 ///
 /// # Safety
-/// `from` can be read and `to` written that far.
+/// `to` can be written that far.
 #[inline(always)]
-unsafe fn piece<const N: usize>(from: &mut *const f64, to: &mut *mut f64) {
+unsafe fn piece<const N: usize>(at: usize, value: &impl Fn(usize) -> f64, to: *mut f64) -> usize {
+    let values: [f64; N] = core::array::from_fn(|i| value(at + i));
     // SAFETY: the caller's promise.
-    unsafe {
-        to.cast::<[f64; N]>().write(from.cast::<[f64; N]>().read());
-        (*from, *to) = (from.add(N), to.add(N));
-    }
+    unsafe { to.add(at).cast::<[f64; N]>().write(values) };
+    at + N
 }

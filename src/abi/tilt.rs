@@ -16,12 +16,12 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
-const ALIVE: u64 = 0x6769_625f_7469_0001;
+const ALIVE: u32 = 0x6769_7401;
 
 /// Tilt of one workpiece. Opaque; its size is `gib_tilt_size()`.
 #[repr(C, align(16))]
 pub struct GibTilt {
-    alive: u64,
+    alive: u32,
     last: Fault,
     machine: Tilt,
 }

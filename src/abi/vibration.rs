@@ -11,12 +11,12 @@ use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_OK};
 use core::ffi::c_void;
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
-const ALIVE: u64 = 0x6769_625f_7669_0001;
+const ALIVE: u32 = 0x6769_7601;
 
 /// The corrected position of one tool slide. Opaque; its size is `gib_vibration_size()`.
 #[repr(C, align(16))]
 pub struct GibVibration {
-    alive: u64,
+    alive: u32,
     last: Fault,
     machine: Vibration,
 }

@@ -18,7 +18,7 @@ use super::config::GIB_LEARNING_HARMONICS;
 use super::io::*;
 use super::lines::Line;
 use super::plan::Plan;
-use super::points::{Bin, Cell, ENTRIES, Place, Table};
+use super::points::{Bin, Cell, ENTRIES, Place, Table, Weight};
 use crate::cycle::backlash::io::GIB_INPUT_ABORT;
 use crate::cycle::turns::fold;
 use crate::cycle::vibration::harmonic::Harmonics;
@@ -78,12 +78,12 @@ pub struct Learning {
     at: usize,
     /// Cycles in which learning waited.
     waited: u64,
-    /// Part of the correction that is in force, and where that is to go.
-    presence: f32,
-    /// Part of the new table that is in force.
-    blend: f32,
+    /// Part of the correction that is in force.
+    presence: f64,
+    /// Part of the table that comes that is in force. At 1 that table is copied to the other, with all of it in force.
+    blend: f64,
     /// Correction and command put out last.
-    correction: f32,
+    correction: f64,
     command: f64,
     reasons: u32,
     /// The table that comes is the last one; then the fault, if any, is told.
@@ -105,9 +105,12 @@ pub struct Learning {
     seen: [f32; ENTRIES],
     best: [f32; ENTRIES],
     bins: [Bin; ENTRIES],
-    /// Which table is in force.
-    front: usize,
-    tables: [Table; 2],
+    weights: [Weight; ENTRIES],
+    /// The table in force, and the one that comes; and the most that either changes from a point to the next, µm.
+    force: Table,
+    coming: Table,
+    steepest: f64,
+    steepest_coming: f64,
 }
 
 impl Default for Learning {
@@ -143,8 +146,11 @@ impl Default for Learning {
             seen: [0.0; ENTRIES],
             best: [0.0; ENTRIES],
             bins: [Bin::default(); ENTRIES],
-            front: 0,
-            tables: [[Cell::default(); ENTRIES]; 2],
+            weights: [Weight::default(); ENTRIES],
+            force: [Cell::default(); ENTRIES],
+            coming: [Cell::default(); ENTRIES],
+            steepest: 0.0,
+            steepest_coming: 0.0,
         }
     }
 }
@@ -163,13 +169,17 @@ impl Learning {
         if plan.resume && held != plan.scale {
             return Err(Fault { code: GIB_ERR_CONFIG, field: "points\0", value: plan.scale, low: held, high: held });
         }
-        if !plan.resume {
-            self.tables = [[Cell::default(); ENTRIES]; 2];
+        if plan.resume {
+            self.force = *self.held();
+            self.steepest = self.steepest.max(self.steepest_coming);
+        } else {
+            (self.force, self.steepest) = ([Cell::default(); ENTRIES], 0.0);
             self.best = [0.0; ENTRIES];
             self.lines = [Line::default(); GIB_LEARNING_HARMONICS];
             self.report.correction_um = 0.0;
         }
         self.plan = plan;
+        self.blend = 0.0;
         self.fault = Fault::NONE;
         (self.known, self.rate, self.speed) = (false, 0.0, 0.0);
         (self.waited, self.grown, self.last_update, self.fresh) = (0, 0, false, true);
@@ -239,7 +249,7 @@ impl Learning {
         self.any(input);
         *output = LearningOutput {
             command_mm: self.command,
-            correction_um: self.correction.into(),
+            correction_um: self.correction,
             status: GIB_BUSY,
             phase: GIB_LEARNING_MEASURE,
             message: GIB_OK,
@@ -250,12 +260,6 @@ impl Learning {
         }
         self.see_usual(input, output);
         output.status
-    }
-
-    fn gather(&mut self, place: Place, turned: f64, left: f32, target: f64) {
-        if let Some(bin) = self.bins.get_mut(place.entry) {
-            bin.add((turned.abs() * self.plan.scale) as f32, left, target);
-        }
     }
 
     fn any(&mut self, input: &LearningInput) {
@@ -272,7 +276,7 @@ impl Learning {
             self.leave(Fault::of(if aborted { GIB_ERR_ABORTED } else { GIB_ERR_DRIVE_FAULT }));
         }
         let turned = self.turn(input.angle_deg);
-        let left = (1e3 * (input.target_mm - input.detected_mm)) as f32;
+        let left = input.target_mm - input.detected_mm;
         self.judge(left);
         if self.busy() && self.phase != Phase::Stopping {
             self.wait_or_work(turned, left, input.target_mm);
@@ -298,21 +302,21 @@ impl Learning {
     }
 
     /// Whether spindle and detected position will do in this cycle.
-    fn judge(&mut self, left: f32) {
+    fn judge(&mut self, left: f64) {
         if self.rate.abs() < self.plan.rate_min {
             self.reasons |= GIB_LEARNING_NO_ROTATION;
         }
         if !left.is_finite() {
             self.reasons |= GIB_LEARNING_NOT_DETECTED;
         } else if left.abs() > self.plan.deviation && self.phase != Phase::Stopping {
-            let (value, most) = (f64::from(left), f64::from(self.plan.deviation));
+            let (value, most) = (1e3 * left, 1e3 * self.plan.deviation);
             let code = GIB_ERR_LEARNING_DEVIATION;
             self.leave(Fault { code, field: "detected_mm\0", value, low: -most, high: most });
         }
     }
 
     /// The state's own work; what was measured beside a bad input is worth nothing.
-    fn wait_or_work(&mut self, turned: f64, left: f32, target: f64) {
+    fn wait_or_work(&mut self, turned: f64, left: f64, target: f64) {
         if self.reasons != 0 {
             self.waited += 1;
             if self.waited > self.plan.wait {
@@ -334,9 +338,12 @@ impl Learning {
     }
 
     fn settle(&mut self, turned: f64) {
-        for bin in self.bins.iter_mut().skip(self.at).take(EMPTIED) {
-            *bin = Bin::default();
-            self.at += 1;
+        for _ in 0..EMPTIED {
+            self.empty(self.at & (ENTRIES - 1));
+            self.at = (self.at + 1).min(self.plan.points + 1);
+        }
+        if self.at > self.plan.points && self.blend == 1.0 {
+            (self.blend, self.steepest) = (0.0, self.steepest_coming);
         }
         self.progress += turned.abs();
         // The correction must be there in full before what it does is measured.
@@ -345,9 +352,22 @@ impl Learning {
         }
     }
 
-    fn measure(&mut self, turned: f64, left: f32, target: f64) {
-        let place = Place::of(self.angle, self.plan.points, self.plan.scale);
-        self.gather(place, turned, left, target);
+    /// Nothing is measured at a point, and a new table's cell is in force.
+    fn empty(&mut self, entry: usize) {
+        (self.bins[entry], self.weights[entry]) = (Bin::default(), Weight::default());
+        if self.blend == 1.0 {
+            self.force[entry] = self.coming[entry];
+        }
+    }
+
+    fn measure(&mut self, turned: f64, left: f64, target: f64) {
+        let entry = Place::of(self.angle, self.plan.scale).entry & (ENTRIES - 1);
+        // A spindle that turns has a rate, which is not 0.
+        let weight = (turned / self.rate).abs() as f32;
+        let bin = &mut self.bins[entry];
+        bin.deviation += f64::from(weight) * left;
+        bin.target = target;
+        self.weights[entry].sum += weight;
         self.progress += turned.abs();
         self.cycles += 1;
         if self.progress >= self.plan.measure {
@@ -358,10 +378,8 @@ impl Learning {
 
     fn blend(&mut self, turned: f64) {
         self.progress += turned.abs();
-        self.blend = self.progress as f32;
-        if self.progress >= 1.0 {
-            self.blend = 0.0;
-            self.front ^= 1;
+        self.blend = self.progress.min(1.0);
+        if self.blend == 1.0 {
             if self.last_update {
                 return self.enter(Phase::Failed);
             }
@@ -375,14 +393,13 @@ impl Learning {
         let wanted = self.phase != Phase::Stopping && !away;
         let presence = self.presence + if wanted { self.plan.fade } else { -self.plan.fade };
         self.presence = presence.clamp(0.0, 1.0);
-        let place = Place::of(self.angle, self.plan.points, self.plan.scale);
-        let front = place.read(&self.tables[self.front & 1]);
-        let back = place.read(&self.tables[(self.front ^ 1) & 1]);
-        let correction = self.presence * (front + self.blend * (back - front));
+        let place = Place::of(self.angle, self.plan.scale);
+        let (now, next) = (place.read(&self.force), place.read(&self.coming));
+        let correction = self.presence * (now + self.blend * (next - now));
         let most = self.plan.slope;
         self.correction += (correction - self.correction).max(-most).min(most);
         self.correction = (self.correction + 1e-10) - 1e-10;
-        self.command = target + 1e-3 * f64::from(self.correction);
+        self.command = target + 1e-3 * self.correction;
         self.end_of_stopping();
     }
 

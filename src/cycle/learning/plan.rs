@@ -37,11 +37,11 @@ pub struct Plan {
     /// µm.
     pub tolerance: f64,
     /// Largest correction, µm, and its largest change in a cycle.
-    pub most: f32,
+    pub most: f64,
     /// See `most`.
-    pub slope: f32,
-    /// Largest deviation of a cycle, µm.
-    pub deviation: f32,
+    pub slope: f64,
+    /// Largest deviation of a cycle, mm.
+    pub deviation: f64,
     /// Growth that fails.
     pub growth: f64,
     /// Turns per cycle from which the spindle turns.
@@ -51,7 +51,7 @@ pub struct Plan {
     /// Relative.
     pub speed_tolerance: f64,
     /// Change of the presence in a cycle.
-    pub fade: f32,
+    pub fade: f64,
     /// Cycles.
     pub wait: u64,
 }
@@ -121,14 +121,14 @@ impl Plan {
             lag: in_range("lag_s\0", c.lag_s, 0.0, 0.1)? / cycle,
             gain: in_range("gain_ratio\0", or(c.gain_ratio, if published { 1.0 } else { 0.7 }), 0.05, 1.0)?,
             tolerance: in_range("tolerance_um\0", c.tolerance_um, 1e-3, 1e3)?,
-            most: most as f32,
-            slope: (1e3 * speed * cycle) as f32,
-            deviation: in_range("deviation_max_um\0", or(c.deviation_max_um, 1e3), c.tolerance_um, 1e6)? as f32,
+            most,
+            slope: 1e3 * speed * cycle,
+            deviation: 1e-3 * in_range("deviation_max_um\0", or(c.deviation_max_um, 1e3), c.tolerance_um, 1e6)?,
             growth: in_range("growth_ratio\0", or(c.growth_ratio, 1.2), 1.01, 10.0)?,
             rate_min: slow / 60.0 * cycle,
             turn_max: 0.25,
             speed_tolerance: in_range("speed_tolerance_ratio\0", or(c.speed_tolerance_ratio, 0.02), 1e-3, 0.5)?,
-            fade: (cycle / in_range("fade_s\0", or(c.fade_s, 0.1), 1e-3, 10.0)?).min(1.0) as f32,
+            fade: (cycle / in_range("fade_s\0", or(c.fade_s, 0.1), 1e-3, 10.0)?).min(1.0),
             wait: (in_range("wait_s\0", or(c.wait_s, 60.0), 0.1, 1e5)? / cycle) as u64,
         })
     }

@@ -26,14 +26,27 @@ pub struct Follower {
 
 impl Follower {
     /// Steps onto the target when that keeps the bounds; else false, and nothing is changed.
-    #[inline(always)]
-    pub fn meets(&mut self, target: f64, bounds: &Bounds) -> bool {
-        let step = target - self.value;
-        let meets = step.abs() <= bounds.speed && (step - self.rate).abs() <= bounds.acceleration;
+    fn meets(&mut self, target: f64, bounds: &Bounds) -> bool {
+        let [step, change] = self.onto(target);
+        let meets = step.abs() <= bounds.speed && change.abs() <= bounds.acceleration;
         if meets {
-            *self = Follower { value: target, rate: step, target };
+            self.land(target, step);
         }
         meets
+    }
+
+    /// The step onto a target, and how it differs from the last one.
+    #[inline(always)]
+    #[must_use]
+    pub fn onto(&self, target: f64) -> [f64; 2] {
+        let step = target - self.value;
+        [step, step - self.rate]
+    }
+
+    /// Makes that step.
+    #[inline(always)]
+    pub fn land(&mut self, target: f64, step: f64) {
+        *self = Follower { value: target, rate: step, target };
     }
 
     /// One cycle toward a finite target. True when the offset is there.

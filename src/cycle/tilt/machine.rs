@@ -23,6 +23,7 @@ use super::verdict::*;
 use crate::cycle::backlash::io::{GIB_INPUT_ABORT, GIB_INPUT_FAULT};
 use crate::error::*;
 use quick::Usual;
+use wide::f64x2;
 
 /// Where the machine is. Each comment says what ends the state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,6 +70,8 @@ pub struct Tilt {
     left: u32,
     /// What the cycles are that are all alike, and for how many more they can be, of how many.
     usual: Usual,
+    /// Largest z offset and its largest step; largest sum of an input, and largest change of a step.
+    bounds: [f64x2; 2],
     alike: u32,
     granted: u32,
     /// The tool is in the cut, and `block` under way.
@@ -104,6 +107,7 @@ impl Default for Tilt {
             air_left: 0,
             left: 0,
             usual: Usual::Rest,
+            bounds: [f64x2::ZERO; 2],
             alike: 0,
             granted: 0,
             cutting: false,
@@ -356,8 +360,7 @@ impl Tilt {
     #[inline(always)]
     fn z_target(&self, input: &TiltInput) -> f64 {
         let [at, gx, gy] = self.plane;
-        let target = at + gx * input.position_mm[0] + gy * input.position_mm[1];
-        if target.abs() < 1e-12 { 0.0 } else { target }
+        (at + gx * input.position_mm[0] + gy * input.position_mm[1] + 1e-3) - 1e-3
     }
 
     /// Moves every offset toward its target; true when all are there.

@@ -40,7 +40,7 @@ impl Learning {
             Phase::Synthesise if i < points => self.synthesise(i),
             Phase::Smooth if i < points => self.smooth(i),
             _ => {
-                close(&mut self.tables[(self.front ^ 1) & 1], points);
+                close(&mut self.coming, points);
                 self.fresh = false;
                 self.enter(Phase::Blend);
             }
@@ -51,33 +51,36 @@ impl Learning {
         if i == 0 {
             self.join_half_turn();
         }
-        let Some(bin) = self.bins.get(i).copied() else { return };
-        let met = bin.weight > 0.0;
+        let entry = i & (ENTRIES - 1);
+        let (deviation, weight) = (1e3 * self.bins[entry].deviation, self.weights[entry].whole());
+        let met = weight > 0.0;
         let before = self.seen.get(i.wrapping_sub(1)).copied().unwrap_or(0.0);
-        let seen = if met { bin.deviation / bin.weight } else { before };
+        let seen = if met { (deviation / weight) as f32 } else { before };
         if let Some(point) = self.seen.get_mut(i) {
             *point = seen;
         }
         if met {
-            self.turns += f64::from(bin.weight);
-            self.squares += f64::from(seen) * f64::from(bin.deviation);
+            self.turns += weight;
+            self.squares += f64::from(seen) * deviation;
             self.report.peak_um = self.report.peak_um.max(seen.abs().into());
         }
         if !self.plan.published {
             let wheel = Wheel::at(angle(i, self.plan.points), self.plan.pairs);
-            self.spectrum.gather(&wheel, self.plan.pairs, bin.deviation);
+            self.spectrum.gather(&wheel, self.plan.pairs, deviation as f32);
         }
     }
 
     /// Half a turn has two entries.
     fn join_half_turn(&mut self) {
-        let last = self.bins.get(self.plan.points).copied().unwrap_or_default();
-        let first = &mut self.bins[0];
-        first.weight += last.weight;
-        first.deviation += last.deviation;
-        if last.weight > 0.0 {
-            first.target = last.target;
+        let last = self.plan.points & (ENTRIES - 1);
+        let (bin, weight) = (self.bins[last], self.weights[last]);
+        if last == 0 || weight.whole() == 0.0 {
+            return;
         }
+        let first = &mut self.bins[0];
+        *first = Bin { deviation: first.deviation + bin.deviation, target: bin.target };
+        let first = &mut self.weights[0];
+        *first = Weight { sum: first.sum + weight.sum, steady: first.steady + weight.steady };
     }
 
     /// All points are seen: within the tolerance, better, or worse.
@@ -130,18 +133,16 @@ impl Learning {
         let led = if led < 0 { led + points } else { led };
         let led = if led >= points { led - points } else { led };
         let seen = usize::try_from(led).ok().and_then(|led| self.seen.get(led)).copied().unwrap_or(0.0);
-        let now = self.tables[self.front & 1].get(i).map_or(0.0, |cell| cell.value);
+        let now = self.force[i & (ENTRIES - 1)].value as f32;
         let Some(best) = self.best.get_mut(i) else { return };
         if self.better {
             *best = now;
         }
-        let most = self.plan.most;
+        let most = self.plan.most as f32;
         let next = if self.last_update { *best } else { now + self.plan.gain as f32 * seen };
         let next = next.max(-most).min(most);
         self.report.correction_um = self.report.correction_um.max(next.abs().into());
-        if let Some(cell) = self.tables[(self.front ^ 1) & 1].get_mut(i) {
-            cell.value = (next + 1e-10) - 1e-10;
-        }
+        self.coming[i & (ENTRIES - 1)].value = clean(next);
     }
 
     /// By harmonics: see [`crate::cycle::learning`].
@@ -164,11 +165,13 @@ impl Learning {
     fn bound(&mut self) {
         let lines = self.lines.iter_mut().take(self.plan.harmonics);
         let sum: f64 = lines.map(|line| line.trial.size()).sum();
-        let part = if sum > self.plan.most.into() { f64::from(self.plan.most) / sum } else { 1.0 };
+        let part = if sum > self.plan.most { self.plan.most / sum } else { 1.0 };
         let turn = TAU / self.plan.scale;
+        self.steepest_coming = 0.0;
         (self.spectrum, self.steep) = (Harmonics::default(), Harmonics::default());
         for (i, line) in self.lines.iter_mut().take(self.plan.harmonics).enumerate() {
             line.trial = line.trial.scaled(part);
+            self.steepest_coming += (i + 1) as f64 * turn * line.trial.size();
             let (a, b) = (line.trial.0 as f32, -line.trial.1 as f32);
             let k = ((i + 1) as f64 * turn) as f32;
             self.spectrum.set(i, [a, b]);
@@ -182,20 +185,22 @@ impl Learning {
         let wheel = Wheel::at(angle(i, self.plan.points), pairs);
         let (value, slope) = (self.spectrum.value(&wheel, pairs), self.steep.value(&wheel, pairs));
         self.report.correction_um = self.report.correction_um.max(value.abs().into());
-        if let Some(cell) = self.tables[(self.front ^ 1) & 1].get_mut(i) {
-            *cell = Cell { value: (value + 1e-10) - 1e-10, slope: (slope + 1e-10) - 1e-10 };
-        }
+        self.coming[i & (ENTRIES - 1)] = Cell { value: clean(value), slope: clean(slope) };
     }
 
     /// Slope of a correction that is only known at its points.
     fn smooth(&mut self, i: usize) {
         let last = self.plan.points.saturating_sub(1);
-        let table = &mut self.tables[(self.front ^ 1) & 1];
-        let at = |i: usize| table.get(i).map_or(0.0, |cell| cell.value);
+        let at = |i: usize| self.coming[i & (ENTRIES - 1)].value;
         let before = at(if i == 0 { last } else { i - 1 });
         let after = at(if i >= last { 0 } else { i + 1 });
-        if let Some(cell) = table.get_mut(i) {
-            cell.slope = (0.5 * (after - before) + 1e-10) - 1e-10;
-        }
+        let step = (after - at(i)).abs();
+        self.steepest_coming = if i == 0 { step } else { self.steepest_coming.max(step) };
+        self.coming[i & (ENTRIES - 1)].slope = (0.5 * (after - before) + 1e-10) - 1e-10;
     }
+}
+
+/// Without digits that could become subnormal.
+fn clean(value: f32) -> f64 {
+    f64::from((value + 1e-10) - 1e-10)
 }

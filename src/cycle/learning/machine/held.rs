@@ -16,45 +16,51 @@ impl Learning {
     /// A point of the revolution, `i` below `count`.
     #[must_use]
     pub fn point(&self, i: usize) -> LearningPoint {
-        let cell = self.tables[self.front & 1].get(i).copied().unwrap_or_default();
+        let cell = self.held().get(i).copied().unwrap_or_default();
         let seen = self.seen.get(i).copied().unwrap_or(0.0);
         let target = self.bins.get(i).map_or(0.0, |bin| bin.target);
         LearningPoint {
             angle_deg: 360.0 * angle(i, self.count().max(1)),
             target_mm: target,
-            command_mm: target + 1e-3 * f64::from(cell.value),
+            command_mm: target + 1e-3 * cell.value,
             detected_mm: target - 1e-3 * f64::from(seen),
         }
     }
 
     /// Takes a whole revolution from elsewhere, at most 1024 points, in the order of `point`; not while busy.
     pub fn install(&mut self, points: impl ExactSizeIterator<Item = LearningPoint>) {
-        let count = points.len().min(ENTRIES - 1);
+        let count = points.len().min(ENTRIES);
         *self = Learning { angle: self.angle, command: self.command, ..Learning::default() };
         self.report.points = count as i32;
-        let table = &mut self.tables[0];
+        let table = &mut self.force;
         for (i, point) in points.take(count).enumerate() {
-            let value = (1e3 * (point.command_mm - point.target_mm)) as f32;
+            let value = 1e3 * (point.command_mm - point.target_mm);
             table[i].value = (value + 1e-10) - 1e-10;
-            self.best[i] = table[i].value;
+            self.best[i] = table[i].value as f32;
             self.bins[i].target = point.target_mm;
             self.seen[i] = (1e3 * (point.target_mm - point.detected_mm)) as f32;
-            self.report.correction_um = self.report.correction_um.max(value.abs().into());
+            self.report.correction_um = self.report.correction_um.max(value.abs());
         }
         for i in 0..count {
             let (before, after) = (if i == 0 { count - 1 } else { i - 1 }, if i + 1 == count { 0 } else { i + 1 });
             let (before, after) = (table[before].value, table[after].value);
             table[i].slope = 0.5 * (after - before);
+            self.steepest = self.steepest.max((after - table[i].value).abs());
         }
         close(table, count);
+    }
+
+    /// The correction in force.
+    pub(super) fn held(&self) -> &Table {
+        if self.blend == 1.0 { &self.coming } else { &self.force }
     }
 
     /// The harmonics of the correction in force, from which the next trials start.
     pub(super) fn take_up(&mut self) {
         let points = self.plan.points;
         let mut sums = Harmonics::default();
-        for (i, cell) in self.tables[self.front & 1].iter().enumerate().take(points) {
-            sums.gather(&Wheel::at(angle(i, points), PAIRS), PAIRS, cell.value);
+        for (i, cell) in self.force.iter().enumerate().take(points) {
+            sums.gather(&Wheel::at(angle(i, points), PAIRS), PAIRS, cell.value as f32);
         }
         let scale = 2.0 / self.plan.scale;
         for (i, line) in self.lines.iter_mut().enumerate() {

@@ -1,12 +1,14 @@
 //! The usual cycle: all goes on as before, the correction in force is kept, and while measuring a point is read.
 //!
 //! It does what `careful` would do, without asking for all that can happen. After any other cycle that one says for how many
-//! cycles more nothing ends, and what is put off until then: angles less whole turns, the measured speed, what has turned.
+//! cycles more nothing ends, that the correction cannot change too fast meanwhile, and what is put off until then: angles less
+//! whole turns, the measured speed, what has turned. A reading weighs 1, for the speed is steady.
 
 use super::*;
+use wide::f64x2;
 
 /// How far, relative, the turn of a usual cycle may be from that at the speed known.
-const PACE: f64 = 0.25;
+const PACE: f64 = 0.1;
 /// Most cycles in a row.
 const MOST: f64 = 1e6;
 
@@ -16,17 +18,17 @@ pub struct Usual {
     /// Cycles more that can be usual, of how many.
     left: u32,
     granted: u32,
-    /// Angle of the last cycle, and of that before the first usual one.
-    at: f64,
-    from: f64,
+    /// Where the next cycle is to find the angle: a pace on from this one's; and this for the first usual cycle.
+    next: f64,
+    first: f64,
+    /// Turn in a cycle at the speed known.
+    pace: f64,
     /// What is to be taken off an angle read.
     base: f64,
-    /// Turn in a cycle at the speed known, and how far it may be from that.
-    pace: f64,
-    band: f64,
-    /// What is put out.
-    status: i32,
-    phase: i32,
+    /// Largest differences: of the angle from where it is to be found, of the detected position from its target, mm.
+    bounds: f64x2,
+    /// What is put out beside the command.
+    told: LearningOutput,
 }
 
 impl Usual {
@@ -34,20 +36,26 @@ impl Usual {
     pub const NONE: Usual = Usual {
         left: 0,
         granted: 0,
-        at: 0.0,
-        from: 0.0,
-        base: 0.0,
+        next: 0.0,
+        first: 0.0,
         pace: 0.0,
-        band: 0.0,
-        status: GIB_OK,
-        phase: GIB_LEARNING_IDLE,
+        base: 0.0,
+        bounds: f64x2::ZERO,
+        told: LearningOutput {
+            command_mm: 0.0,
+            correction_um: 0.0,
+            status: GIB_OK,
+            phase: GIB_LEARNING_IDLE,
+            message: GIB_OK,
+            reasons: 0,
+        },
     };
 
     /// What a usual cycle returns.
     #[inline(always)]
     #[must_use]
     pub fn status(&self) -> i32 {
-        self.status
+        self.told.status
     }
 }
 
@@ -62,73 +70,65 @@ impl Learning {
             Phase::Done => MOST,
             _ => 0.0,
         };
-        if !(steady && self.reasons == 0 && self.presence == 1.0 && cycles >= 1.0) {
+        let at = (self.angle + 0.5) * self.plan.scale;
+        // From a cell's line to the next one's it is at most two steps from point to point.
+        let change = (3.0 * rate * self.plan.scale + 2.0) * self.steepest;
+        let behind = (Place::at(at).read(&self.force) - self.correction).abs();
+        let smooth = change + behind <= self.plan.slope;
+        if !(steady && smooth && self.reasons == 0 && self.presence == 1.0 && self.blend == 0.0 && cycles >= 1.0) {
             return;
         }
-        let at = (self.angle + 0.5) * self.plan.scale;
         let (pace, granted) = (self.rate * self.plan.scale, cycles.min(MOST) as u32);
         self.usual = Usual {
             left: granted,
             granted,
-            at,
-            from: at,
-            base: input.angle_deg * self.plan.points_per_deg - at,
+            next: at + pace,
+            first: at + pace,
             pace,
-            band: PACE * pace.abs(),
-            status: output.status,
-            phase: output.phase,
+            base: input.angle_deg * self.plan.points_per_deg - at,
+            bounds: f64x2::new([PACE * pace.abs(), self.plan.deviation]),
+            told: *output,
         };
     }
 
     /// Ends the usual cycles, and does what they have put off.
     pub(super) fn settle_usual(&mut self) {
-        let done = self.usual.granted - self.usual.left;
+        let usual = &mut self.usual;
+        let done = usual.granted - usual.left;
+        (usual.left, usual.granted) = (0, 0);
         if done > 0 {
-            self.angle = fold(self.usual.at / self.plan.scale - 0.5);
-            self.progress += (self.usual.at - self.usual.from).abs() / self.plan.scale;
+            let at = usual.next - usual.pace;
+            self.angle = fold(at / self.plan.scale - 0.5);
+            self.progress += (usual.next - usual.first).abs() / self.plan.scale;
             self.cycles += u64::from(done);
+            self.correction = Place::at(at).read(&self.force);
         }
-        (self.usual.left, self.usual.granted) = (0, 0);
     }
 
     /// Does this cycle if it is a usual one; else returns false with nothing changed.
     #[inline(always)]
     pub(super) fn quick(&mut self, input: &LearningInput, output: &mut LearningOutput) -> bool {
         let usual = &mut self.usual;
-        if usual.left == 0 || input.flags != 0 {
-            return false;
-        }
+        let Some(left) = usual.left.checked_sub(1) else { return false };
         let at = input.angle_deg * self.plan.points_per_deg - usual.base;
         let place = Place::at(at);
-        let left = (1e3 * (input.target_mm - input.detected_mm)) as f32;
-        // Each comparison is false for what is no number.
-        let steady = (at - usual.at - usual.pace).abs() <= usual.band;
-        if !(steady && place.entry <= self.plan.points && left.abs() <= self.plan.deviation) {
+        let deviation = input.target_mm - input.detected_mm;
+        // Comparisons with what is no number are false.
+        let well = f64x2::new([at - usual.next, deviation]).abs().simd_le(usual.bounds);
+        if (well.to_bitmask() ^ 3) | input.flags != 0 || place.entry > self.plan.points {
             return false;
         }
-        let (Some(cell), Some(bin)) = (self.tables[self.front & 1].get(place.entry), self.bins.get_mut(place.entry))
-        else {
-            return false;
-        };
-        let correction = cell.value + place.beyond * cell.slope;
-        if !((correction - self.correction).abs() <= self.plan.slope) {
-            return false;
+        let correction = place.read(&self.force);
+        if usual.told.phase == GIB_LEARNING_MEASURE {
+            let bin = &mut self.bins[place.entry];
+            bin.deviation += deviation;
+            bin.target = input.target_mm;
+            self.weights[place.entry].steady += 1;
         }
-        if usual.phase == GIB_LEARNING_MEASURE {
-            bin.add((at - usual.at).abs() as f32, left, input.target_mm);
-        }
-        usual.at = at;
-        usual.left -= 1;
-        self.correction = correction;
-        self.command = input.target_mm + 1e-3 * f64::from(correction);
-        *output = LearningOutput {
-            command_mm: self.command,
-            correction_um: correction.into(),
-            status: usual.status,
-            phase: usual.phase,
-            message: GIB_OK,
-            reasons: 0,
-        };
+        usual.next = at + usual.pace;
+        usual.left = left;
+        self.command = input.target_mm + 1e-3 * correction;
+        *output = LearningOutput { command_mm: self.command, correction_um: correction, ..usual.told };
         true
     }
 

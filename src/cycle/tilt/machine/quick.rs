@@ -18,6 +18,15 @@ pub enum Usual {
     Rest,
 }
 
+/// Of all numbers of an input: no number where one of them is none.
+#[inline(always)]
+fn sum(input: &TiltInput) -> f64 {
+    let ([x, y, z], [a, b, c]) = (input.position_mm, input.rotary_deg);
+    let pairs = [[x, y], [z, a], [b, c], [input.load, input.speed_rpm]].map(f64x2::new);
+    let [even, odd] = ((pairs[0] + pairs[1]) + (pairs[2] + pairs[3])).to_array();
+    even + odd
+}
+
 impl Tilt {
     /// One servo cycle; returns the status.
     #[inline(always)]
@@ -50,7 +59,11 @@ impl Tilt {
                 self.alike = self.granted;
                 if self.granted > 0 { Usual::Cut } else { Usual::None }
             }
-            Phase::Active if self.settled => Usual::Active,
+            Phase::Active if self.settled => {
+                let z = &self.plan.linear;
+                self.bounds = [[self.plan.most_mm, z.speed], [HUGE, z.acceleration]].map(f64x2::new);
+                Usual::Active
+            }
             Phase::Idle | Phase::Done | Phase::Failed => Usual::Rest,
             _ => Usual::None,
         };
@@ -69,12 +82,16 @@ impl Tilt {
             }
             true
         } else if self.usual == Usual::Active {
-            // Comparisons with NaN are false.
             let target = self.z_target(input);
-            let safe = input.flags & !GIB_TILT_INPUT_CUTTING == 0 && sound(input);
             let [_, _, z, ..] = &mut self.followers;
-            let met = safe && target.abs() <= self.plan.most_mm && z.meets(target, &self.plan.linear);
+            let [step, change] = z.onto(target);
+            // Comparisons with what is no number are false.
+            let [near, slow] = self.bounds;
+            let near = f64x2::new([target, step]).abs().simd_le(near);
+            let slow = f64x2::new([sum(input), change]).abs().simd_le(slow);
+            let met = (near & slow).to_bitmask() == 3 && input.flags & !GIB_TILT_INPUT_CUTTING == 0;
             if met {
+                z.land(target, step);
                 self.output.offset_mm[2] = target;
             }
             met
