@@ -155,12 +155,6 @@ static void work(struct __comp_state *__comp_inst, long period)
     awake = busy || owned || index_enable;
 }
 
-/* The torque limit that the drive shall have: what gib last asked for. */
-static double limit(struct __comp_state *__comp_inst)
-{
-    return out.request_id ? out.torque_limit : torque_limit_normal;
-}
-
 /* A cycle that is not as usual: a fault, the machine off, or work. */
 __attribute__((noinline, cold)) static void any(struct __comp_state *__comp_inst, int good, long period)
 {
@@ -172,9 +166,10 @@ __attribute__((noinline, cold)) static void any(struct __comp_state *__comp_inst
         drive_cmd = cmd_safe - offset;
         position_fb = drive_safe + offset;
     }
-    torque_limit_cmd = limit(__comp_inst);
+    torque_limit_cmd = out.request_id ? out.torque_limit : torque_limit_normal;
     ok = ok_in && !(fault | stop);
-    unusual = awake | fault | stop;
+    /* Before the first homing the limit is the parameter, which may change. */
+    unusual = awake | fault | stop | (out.request_id == 0);
 }
 
 FUNCTION(_)
@@ -187,7 +182,6 @@ FUNCTION(_)
     } else {
         drive_cmd = cmd - offset;
         position_fb = fb + offset;
-        torque_limit_cmd = limit(__comp_inst);
         ok = ok_in;
     }
 }

@@ -53,6 +53,7 @@ param rw float viscous = 0 "friction of the spindle, N m s/rad; measured with th
 variable gib_inertia *gib;
 variable gib_speed_variation *variation;
 variable gib_inertia_output out;
+variable gib_speed_variation_input asked;
 variable gib_speed_variation_output swing;
 variable int running = 0;
 variable int measured = 0;
@@ -185,15 +186,11 @@ __attribute__((noinline, cold)) static void end_of_variation(struct __comp_state
 static double varied(struct __comp_state *__comp_inst, double wanted)
 {
     int go_on = vary & enable & !fault & (wanted != 0.0) & (ina > 0.0);
-    gib_speed_variation_input in = {
-        .speed_rpm = wanted,
-        .amplitude_ratio = amplitude,
-        .period_s = swing_time,
-        .cutting_nm = 0.0,
-        .flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (go_on ? 0 : GIB_SPEED_VARIATION_STOP),
-        .reserved = 0,
-    };
-    int32_t status = gib_speed_variation_step(variation, &in, &swing);
+    asked.speed_rpm = wanted;
+    asked.amplitude_ratio = amplitude;
+    asked.period_s = swing_time;
+    asked.flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (go_on ? 0 : GIB_SPEED_VARIATION_STOP);
+    int32_t status = gib_speed_variation_step(variation, &asked, &swing);
     vary_message = swing.message;
     amplitude_most = swing.amplitude_limit_ratio;
     if (status != GIB_BUSY) {

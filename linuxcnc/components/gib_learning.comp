@@ -45,6 +45,7 @@ param rw s32 settling = 0 "turns to settle after a change; as many as gib_vibrat
 param rw float lag = 0 "of the servo, s";
 
 variable gib_learning *gib;
+variable gib_learning_input in;
 variable gib_learning_output out;
 variable int told_status = 0; /* what the pins say */
 variable int told_phase = 0;
@@ -114,13 +115,10 @@ __attribute__((noinline, cold)) static void tell(struct __comp_state *__comp_ins
 /* One cycle of learning, or of what is left of it. */
 static void learn(struct __comp_state *__comp_inst, unsigned flags)
 {
-    gib_learning_input in = {
-        .target_mm = cmd_safe,
-        .detected_mm = valid ? detected : NAN,
-        .angle_deg = angle,
-        .flags = flags,
-        .reserved = 0,
-    };
+    in.target_mm = cmd_safe;
+    in.detected_mm = valid ? detected : NAN;
+    in.angle_deg = angle;
+    in.flags = flags;
     int32_t status = gib_learning_step(gib, &in, &out);
     correction = out.correction_um;
     shift = 1e-3 * out.correction_um;

@@ -1,12 +1,16 @@
-component gib_tilt "measures the tilt of the workpiece from the spindle load, and moves z along with it";
+component gib_tilt "measures the tilt of the workpiece from the spindle load, and undoes it by z or by rotary axes";
 description
 """
-For machines of three axes: z follows the workpiece's plane. Stands between \\fBjoint.2.motor-pos-cmd\\fR and what follows it in the
+With three axes z follows the workpiece's plane. The component stands between \\fBjoint.2.motor-pos-cmd\\fR and what follows it in the
 chain to the z drive, and takes the offset off again on the way back, so that the planner knows nothing of it.
 
 \\fBstart\\fR rising arms a measurement. While \\fBcutting\\fR is true, with spindle and feed as in the table, the load along the path
 is read; \\fBfinish\\fR rising evaluates it. A tilt beyond its uncertainty raises \\fBwarn\\fR: \\fBaccept\\fR brings z's offset in,
 \\fBoff\\fR declines, and later takes it out again.
+
+With rotary axes, named by \\fBrotary-axis-N\\fR, these turn the tilt away, and what a pivot's distance asks of x, y and z comes
+with it. Net each of \\fBoffset-x\\fR to \\fBoffset-c\\fR to an \\fBoffset\\fR(9) between its joint and the drive; z's is in
+\\fBdrive-cmd\\fR already.
 
 The table of loads, \\fBdepth-NN\\fR and \\fBload-NN\\fR, holds for one tool, material, speed and feed; rows up to the first depth of 0.
 A parameter left at 0 takes the default of gib_tilt_config in gib.h.
@@ -17,6 +21,9 @@ include "gib_hal.h";
 pin in float x "commanded position from joint.0.pos-cmd, mm";
 pin in float y "commanded position from joint.1.pos-cmd, mm";
 pin in float z "commanded position from joint.2.pos-cmd, mm";
+pin in float angle_a "commanded angle from the joint of a, degrees; only read with rotary axes";
+pin in float angle_b "the same of b";
+pin in float angle_c "the same of c";
 pin in float position_cmd "from joint.2.motor-pos-cmd, mm";
 pin out float position_fb "to joint.2.motor-pos-fb, mm";
 pin out float drive_cmd "the same with the offset, mm";
@@ -41,6 +48,11 @@ pin out s32 verdict = 0 "GIB_TILT_ decision: 1 in band, 2 not significant, 3 sig
 pin out float tilt "angle of the workpiece's plane, degrees";
 pin out float uncertainty "its uncertainty, k = 2, degrees";
 pin out float offset_z "offset of z now, mm";
+pin out float offset_x "offset of x now, mm; it and the next four move with rotary axes only";
+pin out float offset_y "of y, mm";
+pin out float offset_a "of a, degrees";
+pin out float offset_b "of b, degrees";
+pin out float offset_c "of c, degrees";
 
 param rw float depth_##[8] = 0 "table: depth of cut, rising, mm";
 param rw float load_##[8] = 0 "table: load at that depth, rising, A or %";
@@ -50,17 +62,26 @@ param rw s32 dc_load = 0 "1: the load is a DC signal in %; 0: the rectified curr
 param rw s32 motor_pole_pairs = 0 "of the spindle motor, for a current";
 param rw float entry = 0 "length at both ends of a pass that does not count, mm";
 param rw float band = 0 "a tilt up to this is left alone, degrees";
-param rw float offset_most = 0 "largest offset of z, mm";
+param rw float offset_most = 0 "largest offset of x, y or z, mm";
+param rw float turn_most = 0 "largest offset of a, b or c, degrees";
+param rw s32 rotary_axis_#[2] = 0 "rotary axis that may turn, the one that carries the other first: 1 a, 2 b, 3 c; 0: none";
+param rw bit rotary_tool_#[2] = 0 "it turns the tool, not the workpiece";
+param rw s32 rotary_sense_#[2] = 1 "-1: a positive command turns by the left hand";
+param rw float rotary_x_#[2] = 0 "a point on its axis, mm: of the machine, or from the tool tip where it turns the tool";
+param rw float rotary_y_#[2] = 0 "the same";
+param rw float rotary_z_#[2] = 0 "the same";
+param rw bit rtcp = 0 "the control keeps the tool at the workpiece when rotary axes turn";
 
 variable gib_tilt *gib;
+variable gib_tilt_input in;
 variable gib_tilt_output out;
 variable int told_phase = 0; /* what the pins say */
 variable double cmd_safe = 0.0;
 variable double fb_safe = 0.0;
 variable double shift = 0.0; /* z's offset, mm */
+variable int turns = 0; /* axes that may turn */
 variable int awake = 0;
 variable int started = 0;
-variable unsigned accepted = 0;
 variable int fault = 0;
 
 option extra_setup yes;
@@ -107,11 +128,18 @@ static int32_t begin(struct __comp_state *__comp_inst, double cycle_s)
     config.entry_mm = entry;
     config.band_deg = band;
     config.offset_max_mm = offset_most;
+    config.offset_max_deg = turn_most;
+    config.tool_centre_point = rtcp;
+    for (i = 0; i < 2; i++) {
+        config.rotary[i] = (gib_tilt_rotary){rotary_axis(i), rotary_tool(i), rotary_sense(i), 0,
+                                             {rotary_x(i), rotary_y(i), rotary_z(i)}};
+    }
+    turns = rotary_axis(0) || rotary_axis(1);
     config.ack_timeout_s = 3600.0;
     return gib_tilt_start(gib, &config, &table);
 }
 
-/* Tells what has changed, and what the measurement found, once it is evaluated. */
+/* Tells what has changed, and what the measurement found, once it is evaluated. In a ramp something does in every cycle. */
 __attribute__((noinline, cold)) static void tell(struct __comp_state *__comp_inst, int32_t status)
 {
     gib_tilt_report report;
@@ -120,7 +148,13 @@ __attribute__((noinline, cold)) static void tell(struct __comp_state *__comp_ins
         uncertainty = report.uncertainty_deg;
         verdict = report.decision;
     }
-    state = told_phase = out.phase;
+    offset_x = out.offset_mm[0];
+    offset_y = out.offset_mm[1];
+    offset_a = out.offset_deg[0];
+    offset_b = out.offset_deg[1];
+    offset_c = out.offset_deg[2];
+    state = out.phase;
+    told_phase = out.phase == GIB_TILT_RAMP_ON || out.phase == GIB_TILT_RAMP_OFF ? -1 : out.phase;
     active = out.phase == GIB_TILT_ACTIVE;
     warn = out.warning;
     awake = status == GIB_BUSY;
@@ -132,17 +166,22 @@ __attribute__((noinline, cold)) static void tell(struct __comp_state *__comp_ins
 /* One cycle of a measurement, or of an offset that comes, stays or goes. */
 static void work(struct __comp_state *__comp_inst)
 {
-    gib_tilt_input in = {
-        .position_mm = {x, y, z},
-        .rotary_deg = {0.0, 0.0, 0.0},
-        .load = spindle_load,
-        .speed_rpm = speed,
-        .acknowledged_id = accepted,
-        .flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (cutting ? GIB_TILT_INPUT_CUTTING : 0) |
-                 (finish ? GIB_TILT_INPUT_END : 0) | (off ? GIB_TILT_INPUT_OFF : 0),
-    };
+    in.position_mm[0] = x;
+    in.position_mm[1] = y;
+    in.position_mm[2] = z;
+    in.load = spindle_load;
+    in.speed_rpm = speed;
+    in.flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (cutting ? GIB_TILT_INPUT_CUTTING : 0) |
+               (finish ? GIB_TILT_INPUT_END : 0) | (off ? GIB_TILT_INPUT_OFF : 0);
+    if (turns) {
+        in.rotary_deg[0] = angle_a;
+        in.rotary_deg[1] = angle_b;
+        in.rotary_deg[2] = angle_c;
+    }
     int32_t status = gib_tilt_step(gib, &in, &out);
-    accepted = accept ? out.request_id : accepted;
+    if (accept) {
+        in.acknowledged_id = out.request_id;
+    }
     if ((status ^ GIB_BUSY) | (out.phase ^ told_phase)) {
         tell(__comp_inst, status);
     }

@@ -31,6 +31,7 @@ param rw s32 harmonic_count = 0 "harmonics of a turn that are tracked";
 param rw float averaging = 0 "turns over which they are averaged";
 
 variable gib_vibration *gib;
+variable gib_vibration_input in;
 variable gib_vibration_output out;
 variable int told_phase = 0; /* what the pins say */
 variable unsigned told_reasons = 0;
@@ -86,14 +87,11 @@ __attribute__((noinline, cold)) static void tell(struct __comp_state *__comp_ins
 /* A cycle in which the correction is in force, comes or goes. */
 static void work(struct __comp_state *__comp_inst)
 {
-    gib_vibration_input in = {
-        .scale_mm = scale,
-        .second_slide_mm = 0.0,
-        .angle_deg = angle,
-        .acceleration_m_s2 = {seat, bearing},
-        .flags = on ? 0 : GIB_INPUT_ABORT,
-        .reserved = 0,
-    };
+    in.scale_mm = scale;
+    in.angle_deg = angle;
+    in.acceleration_m_s2[0] = seat;
+    in.acceleration_m_s2[1] = bearing;
+    in.flags = on ? 0 : GIB_INPUT_ABORT;
     int32_t status = gib_vibration_step(gib, &in, &out);
     position = out.position_mm;
     correction = out.correction_um;

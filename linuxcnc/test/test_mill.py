@@ -379,6 +379,26 @@ def tilt_followed():
     mdi("M5")
 
 
+def tilt_turned_away():
+    """The same workpiece on a machine that could turn it about y: b is told to, and nothing else. The mill has no b."""
+    for name, value in (("rotary-axis-0", 2), ("rtcp", 1)):
+        hal.set_p("gib-tilt.0." + name, str(value))
+    mdi("M3 S600")
+    mdi("G4 P1.5")
+    mdi("M117")
+    cut(50, 20)
+    mdi("M118")
+    mdi("M119 P1")
+    truth = math.degrees(math.atan(pin("gib-sim-cut.0.slope-x")))
+    turned, others = pin("gib-tilt.0.offset-b"), [pin("gib-tilt.0.offset-" + axis) for axis in "acxyz"]
+    check(abs(turned - truth) < max(0.02, pin("gib-tilt.0.uncertainty")) and max(map(abs, others)) < 1e-3,
+          f"b is told to turn by {turned:.3f} deg, truth {truth:.3f}, the others by {others}; {told()}")
+    mdi("M119 P0")
+    check(pin("gib-tilt.0.offset-b") == 0 and not pin("gib-tilt.0.busy"), f"and back; {told()}")
+    hal.set_p("gib-tilt.0.rotary-axis-0", "0")
+    mdi("M5")
+
+
 def vibration_corrected():
     """Seat and bearing swing with the spindle: the corrected position is nearer to the truth than the scale."""
     mdi("M3 S600")
@@ -425,7 +445,7 @@ def swing_learnt():
 
 
 TESTS = [homing, refused, inertia_and_variation, lost_motion_measured, abort_restores, put_back, diagnosed,
-         tilt_followed, vibration_corrected, swing_learnt, no_number_reaches_motion]
+         tilt_followed, tilt_turned_away, vibration_corrected, swing_learnt, no_number_reaches_motion]
 
 
 def main(names):

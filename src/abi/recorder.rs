@@ -1,7 +1,7 @@
 //! Family `recorder`: channels at servo rate into shared memory, as seen from C.
 
 use super::guard::{guarded, instance, instance_mut, placed, versioned};
-use super::shared_memory::SharedMemory;
+use super::shared_memory::{SharedMemory, copy, gather};
 use super::types::GibErrorDetail;
 use crate::cycle::recorder::layout::{HEAD, Shape};
 use crate::cycle::recorder::writer::{self, Plan, State};
@@ -263,8 +263,12 @@ pub unsafe extern "C" fn gib_recorder_start(handle: *mut GibRecorder, config: *c
 /// `handle` is NULL or an instance; `values` is NULL or points to `count` readable numbers.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn gib_recorder_step(handle: *mut GibRecorder, values: *const f64, count: u32) -> i32 {
-    // SAFETY: `count` readable numbers by the caller's promise.
-    unsafe { step(handle, values.is_null(), count, |i| values.add(i).read()) }
+    let write = |to: *mut f64| {
+        // SAFETY: `count` readable numbers by the caller's promise, room for them in a row by `step`'s.
+        unsafe { copy(values, count as usize, to) }
+    };
+    // SAFETY: the caller's promise; `count` values are written.
+    unsafe { step(handle, values.is_null(), count, write) }
 }
 
 /// One servo cycle, as `gib_recorder_step`, of values that lie scattered: each is read from its own address, once, when a row
@@ -286,16 +290,20 @@ pub unsafe extern "C" fn gib_recorder_step_from(
     sources: *const *const f64,
     count: u32,
 ) -> i32 {
-    // SAFETY: `count` addresses of readable numbers by the caller's promise. Read once, for others may write there meanwhile.
-    unsafe { step(handle, sources.is_null(), count, |i| sources.add(i).read().read_volatile()) }
+    let write = |to: *mut f64| {
+        // SAFETY: `count` addresses of readable numbers by the caller's promise, room for them in a row by `step`'s.
+        unsafe { gather(sources, count as usize, to) }
+    };
+    // SAFETY: the caller's promise; `count` values are written.
+    unsafe { step(handle, sources.is_null(), count, write) }
 }
 
-/// One servo cycle with the values that `value` knows, if there are any.
+/// One servo cycle; when a row is due, `write` writes its values where it is told.
 ///
 /// # Safety
-/// `handle` is NULL or an instance; `value` can be asked for each number below `count` unless there are none.
+/// `handle` is NULL or an instance; `write` writes `count` values, and is not called when there are none.
 #[inline(always)]
-unsafe fn step(handle: *mut GibRecorder, none: bool, count: u32, value: impl Fn(usize) -> f64) -> i32 {
+unsafe fn step(handle: *mut GibRecorder, none: bool, count: u32, write: impl FnOnce(*mut f64)) -> i32 {
     // SAFETY: the caller promises NULL or an instance.
     let Some(handle) = (unsafe { handle.as_mut() }) else { return GIB_ERR_NULL };
     if handle.alive != RECORDING || count != handle.plan.channels || none {
@@ -304,7 +312,7 @@ unsafe fn step(handle: *mut GibRecorder, none: bool, count: u32, value: impl Fn(
     // SAFETY: the mark is RECORDING only while there is a memory.
     let memory = unsafe { handle.memory.as_ref().unwrap_unchecked() };
     // SAFETY: the plan is of the memory's own shape, so that each of its places has room for a row of `channels`.
-    let row = |place: usize, number: u64| unsafe { memory.put_row(place, number, count as usize, value) };
+    let row = |place: usize, number: u64| unsafe { memory.put_row(place, number, write) };
     // SAFETY: every mapping has a header.
     writer::step(&handle.plan, &mut handle.state, row, |rows| unsafe { memory.release(HEAD, rows) });
     GIB_BUSY

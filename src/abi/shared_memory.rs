@@ -44,18 +44,18 @@ impl SharedMemory {
         unsafe { core::slice::from_raw_parts(self.start, self.words) }
     }
 
-    /// Writes a row: its number, then `count` values, each of which `value` knows. For the cycle: without a check.
+    /// Writes a row: its number, then the values, which `write` puts where it is told. For the cycle: without a check.
     ///
     /// # Safety
-    /// `place + 1 + count` is not above the words of the mapping.
+    /// From `place` on there is room in the mapping for the number and for what `write` writes.
     #[inline(always)]
-    pub unsafe fn put_row(&self, place: usize, number: u64, count: usize, value: impl Fn(usize) -> f64) {
+    pub unsafe fn put_row(&self, place: usize, number: u64, write: impl FnOnce(*mut f64)) {
         // SAFETY: inside the mapping by the caller's promise, which outlives the call and which this process never reads.
         // Another process copies while this writes, and sees by the head which of what it has copied was whole.
         unsafe {
             let row = self.start.cast_mut().cast::<u64>().add(place);
             row.write(number);
-            write(count, value, row.add(1).cast::<f64>());
+            write(row.add(1).cast::<f64>());
         }
     }
 
@@ -79,41 +79,84 @@ impl SharedMemory {
     }
 }
 
-/// Writes values in pieces of a fixed size, each a few instructions without a loop: so many channels are not worth more.
+/// Copies values in pieces of a fixed size, each a few instructions without a loop: so many channels are not worth more.
 ///
 /// # Safety
-/// `to` has room for `count` values, and nobody else in this process uses it.
+/// `from` can be read and `to` written for `count` values, and nobody else in this process uses `to`.
 #[inline(always)]
-unsafe fn write(count: usize, value: impl Fn(usize) -> f64, to: *mut f64) {
-    // SAFETY: each piece is within the room, since the pieces add up to `count`.
+pub unsafe fn copy(from: *const f64, count: usize, to: *mut f64) {
+    // SAFETY: each piece is within the values and their room, since the pieces add up to `count`.
     unsafe {
-        let mut at = 0;
-        while count - at >= 16 {
-            at = piece::<16>(at, &value, to);
+        let (mut from, mut to, mut left) = (from, to, count);
+        while left >= 16 {
+            piece::<16>(&mut from, &mut to);
+            left -= 16;
         }
-        if count & 8 != 0 {
-            at = piece::<8>(at, &value, to);
+        if left & 8 != 0 {
+            piece::<8>(&mut from, &mut to);
         }
-        if count & 4 != 0 {
-            at = piece::<4>(at, &value, to);
+        if left & 4 != 0 {
+            piece::<4>(&mut from, &mut to);
         }
-        if count & 2 != 0 {
-            at = piece::<2>(at, &value, to);
+        if left & 2 != 0 {
+            piece::<2>(&mut from, &mut to);
         }
-        if count & 1 != 0 {
-            piece::<1>(at, &value, to);
+        if left & 1 != 0 {
+            piece::<1>(&mut from, &mut to);
         }
     }
 }
 
-/// Writes `N` values from the one at `at` on; the place behind them.
+/// Copies `N` values and goes on behind them.
 ///
 /// # Safety
-/// `to` can be written that far.
+/// `from` can be read and `to` written that far.
 #[inline(always)]
-unsafe fn piece<const N: usize>(at: usize, value: &impl Fn(usize) -> f64, to: *mut f64) -> usize {
-    let values: [f64; N] = core::array::from_fn(|i| value(at + i));
+unsafe fn piece<const N: usize>(from: &mut *const f64, to: &mut *mut f64) {
     // SAFETY: the caller's promise.
-    unsafe { to.add(at).cast::<[f64; N]>().write(values) };
-    at + N
+    unsafe {
+        to.cast::<[f64; N]>().write(from.cast::<[f64; N]>().read());
+        (*from, *to) = (from.add(N), to.add(N));
+    }
+}
+
+/// Copies values from an address each, in pieces as [`copy`].
+///
+/// # Safety
+/// Each of the `count` addresses at `from` can be read, and `to` written; nobody else in this process uses `to`.
+#[inline(always)]
+pub unsafe fn gather(from: *const *const f64, count: usize, to: *mut f64) {
+    // SAFETY: each place is below `count`, since the pieces add up to it.
+    unsafe {
+        let mut at = 0;
+        while count - at >= 16 {
+            gathered::<16>(from, to, &mut at);
+        }
+        if count & 8 != 0 {
+            gathered::<8>(from, to, &mut at);
+        }
+        if count & 4 != 0 {
+            gathered::<4>(from, to, &mut at);
+        }
+        if count & 2 != 0 {
+            gathered::<2>(from, to, &mut at);
+        }
+        if count & 1 != 0 {
+            gathered::<1>(from, to, &mut at);
+        }
+    }
+}
+
+/// Copies `N` values from their addresses and goes on behind them. Each is read once, for others may write there meanwhile.
+///
+/// # Safety
+/// As [`gather`], from `at` on.
+#[inline(always)]
+unsafe fn gathered<const N: usize>(from: *const *const f64, to: *mut f64, at: &mut usize) {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let values: [f64; N] = core::array::from_fn(|i| from.add(*at + i).read().read_volatile());
+        to.add(*at).cast::<[f64; N]>().write(values);
+    }
+    *at += N;
 }

@@ -20,7 +20,7 @@ use super::lines::Line;
 use super::plan::Plan;
 use super::points::{Bin, Cell, ENTRIES, Place, Table, Weight};
 use crate::cycle::backlash::io::GIB_INPUT_ABORT;
-use crate::cycle::turns::fold;
+use crate::cycle::turns::{fold, folded};
 use crate::cycle::vibration::harmonic::Harmonics;
 use crate::error::*;
 use quick::Usual;
@@ -233,8 +233,8 @@ impl Learning {
     /// One servo cycle; returns the status.
     #[inline(always)]
     pub fn step(&mut self, input: &LearningInput, output: &mut LearningOutput) -> i32 {
-        if self.quick(input, output) {
-            return self.usual.status();
+        if let Some(status) = self.quick(input, output) {
+            return status;
         }
         if self.phase == Phase::Idle && self.idle(input, output) {
             return GIB_OK;
@@ -245,6 +245,11 @@ impl Learning {
     /// Any cycle, with all that can happen in one.
     #[inline(never)]
     fn careful(&mut self, input: &LearningInput, output: &mut LearningOutput) -> i32 {
+        if self.turn_over(input.angle_deg) {
+            if let Some(status) = self.quick(input, output) {
+                return status;
+            }
+        }
         self.settle_usual();
         self.any(input);
         *output = LearningOutput {

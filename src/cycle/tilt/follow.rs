@@ -31,6 +31,7 @@ impl Follower {
         let meets = step.abs() <= bounds.speed && change.abs() <= bounds.acceleration;
         if meets {
             self.land(target, step);
+            self.meant();
         }
         meets
     }
@@ -43,10 +44,16 @@ impl Follower {
         [step, step - self.rate]
     }
 
-    /// Makes that step.
+    /// Makes that step. Before any other than such steps, [`Follower::meant`] is to be told.
     #[inline(always)]
     pub fn land(&mut self, target: f64, step: f64) {
-        *self = Follower { value: target, rate: step, target };
+        (self.value, self.rate) = (target, step);
+    }
+
+    /// The last step went onto its target.
+    #[inline(always)]
+    pub fn meant(&mut self) {
+        self.target = self.value;
     }
 
     /// One cycle toward a finite target. True when the offset is there.

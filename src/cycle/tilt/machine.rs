@@ -70,6 +70,8 @@ pub struct Tilt {
     left: u32,
     /// What the cycles are that are all alike, and for how many more they can be, of how many.
     usual: Usual,
+    /// Z follows the path, and all other offsets rest.
+    following: bool,
     /// Largest z offset and its largest step; largest sum of an input, and largest change of a step.
     bounds: [f64x2; 2],
     alike: u32,
@@ -107,6 +109,7 @@ impl Default for Tilt {
             air_left: 0,
             left: 0,
             usual: Usual::Rest,
+            following: false,
             bounds: [f64x2::ZERO; 2],
             alike: 0,
             granted: 0,
@@ -442,8 +445,8 @@ impl Tilt {
     }
 
     fn enter(&mut self, phase: Phase) {
-        self.phase = phase;
-        self.usual = Usual::None;
+        self.unfollow();
+        (self.phase, self.usual) = (phase, Usual::None);
         self.output.warning = i32::from(phase == Phase::Warning);
         self.output.phase = match phase {
             Phase::Idle => GIB_TILT_IDLE,

@@ -9,12 +9,26 @@ use wide::f64x2;
 
 /// How far, relative, the turn of a usual cycle may be from that at the speed known.
 const PACE: f64 = 0.1;
+/// How much faster than that the spindle may be over all of them.
+const DRIFT: f64 = 0.02;
 /// Most cycles in a row.
 const MOST: f64 = 1e6;
+
+/// What a usual cycle is now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// There is none.
+    None,
+    /// The correction is in force.
+    Kept,
+    /// And the deviation is measured.
+    Measured,
+}
 
 /// What a usual cycle needs. Angles in points behind the first, not wrapped.
 #[derive(Debug, Clone, Copy)]
 pub struct Usual {
+    kind: Kind,
     /// Cycles more that can be usual, of how many.
     left: u32,
     granted: u32,
@@ -34,6 +48,7 @@ pub struct Usual {
 impl Usual {
     /// No usual cycles.
     pub const NONE: Usual = Usual {
+        kind: Kind::None,
         left: 0,
         granted: 0,
         next: 0.0,
@@ -50,20 +65,14 @@ impl Usual {
             reasons: 0,
         },
     };
-
-    /// What a usual cycle returns.
-    #[inline(always)]
-    #[must_use]
-    pub fn status(&self) -> i32 {
-        self.told.status
-    }
 }
 
 impl Learning {
     /// Says for how many cycles more nothing ends, after one that was put out.
     pub(super) fn see_usual(&mut self, input: &LearningInput, output: &LearningOutput) {
-        let rate = self.rate.abs() * (1.0 + PACE);
-        let steady = self.rate.abs() * (1.0 - PACE) > self.plan.rate_min && rate <= self.plan.turn_max;
+        let fastest = self.rate.abs() * (1.0 + PACE);
+        let steady = self.rate.abs() * (1.0 - PACE) > self.plan.rate_min && fastest <= self.plan.turn_max;
+        let rate = self.rate.abs() * (1.0 + DRIFT);
         let cycles = match self.phase {
             Phase::Settle if self.at > self.plan.points => (self.plan.settle - self.progress) / rate - 1.0,
             Phase::Measure => (self.plan.measure - self.progress) / rate - 1.0,
@@ -72,7 +81,7 @@ impl Learning {
         };
         let at = (self.angle + 0.5) * self.plan.scale;
         // From a cell's line to the next one's it is at most two steps from point to point.
-        let change = (3.0 * rate * self.plan.scale + 2.0) * self.steepest;
+        let change = (3.0 * fastest * self.plan.scale + 2.0) * self.steepest;
         let behind = (Place::at(at).read(&self.force) - self.correction).abs();
         let smooth = change + behind <= self.plan.slope;
         if !(steady && smooth && self.reasons == 0 && self.presence == 1.0 && self.blend == 0.0 && cycles >= 1.0) {
@@ -80,6 +89,7 @@ impl Learning {
         }
         let (pace, granted) = (self.rate * self.plan.scale, cycles.min(MOST) as u32);
         self.usual = Usual {
+            kind: if self.phase == Phase::Measure { Kind::Measured } else { Kind::Kept },
             left: granted,
             granted,
             next: at + pace,
@@ -95,7 +105,7 @@ impl Learning {
     pub(super) fn settle_usual(&mut self) {
         let usual = &mut self.usual;
         let done = usual.granted - usual.left;
-        (usual.left, usual.granted) = (0, 0);
+        (usual.kind, usual.left, usual.granted) = (Kind::None, 0, 0);
         if done > 0 {
             let at = usual.next - usual.pace;
             self.angle = fold(at / self.plan.scale - 0.5);
@@ -105,31 +115,61 @@ impl Learning {
         }
     }
 
-    /// Does this cycle if it is a usual one; else returns false with nothing changed.
+    /// Does this cycle if it is a usual one, and returns its status; else none with nothing changed.
     #[inline(always)]
-    pub(super) fn quick(&mut self, input: &LearningInput, output: &mut LearningOutput) -> bool {
+    pub(super) fn quick(&mut self, input: &LearningInput, output: &mut LearningOutput) -> Option<i32> {
+        match self.usual.kind {
+            Kind::Measured => self.quick_as::<true>(input, output),
+            Kind::Kept => self.quick_as::<false>(input, output),
+            Kind::None => None,
+        }
+    }
+
+    #[inline(always)]
+    fn quick_as<const MEASURED: bool>(&mut self, input: &LearningInput, output: &mut LearningOutput) -> Option<i32> {
         let usual = &mut self.usual;
-        let Some(left) = usual.left.checked_sub(1) else { return false };
         let at = input.angle_deg * self.plan.points_per_deg - usual.base;
         let place = Place::at(at);
         let deviation = input.target_mm - input.detected_mm;
         // Comparisons with what is no number are false.
         let well = f64x2::new([at - usual.next, deviation]).abs().simd_le(usual.bounds);
-        if (well.to_bitmask() ^ 3) | input.flags != 0 || place.entry > self.plan.points {
-            return false;
+        if well.to_bitmask().wrapping_sub(3) | input.flags != 0 || place.entry > self.plan.points {
+            return None;
         }
         let correction = place.read(&self.force);
-        if usual.told.phase == GIB_LEARNING_MEASURE {
+        let mut told = LearningOutput { status: GIB_BUSY, phase: GIB_LEARNING_MEASURE, ..LearningOutput::default() };
+        if MEASURED {
             let bin = &mut self.bins[place.entry];
             bin.deviation += deviation;
             bin.target = input.target_mm;
-            self.weights[place.entry].steady += 1;
+            let reads = &mut self.weights[place.entry].steady;
+            *reads = reads.wrapping_add(1);
+        } else {
+            told = usual.told;
         }
         usual.next = at + usual.pace;
-        usual.left = left;
+        usual.left -= 1;
+        if usual.left == 0 {
+            usual.kind = Kind::None;
+        }
         self.command = input.target_mm + 1e-3 * correction;
-        *output = LearningOutput { command_mm: self.command, correction_um: correction, ..usual.told };
-        true
+        *output = LearningOutput { command_mm: self.command, correction_um: correction, ..told };
+        Some(told.status)
+    }
+
+    /// Where a whole turn has gone by, or the angle read begins anew, the usual cycles go on with other numbers; false when
+    /// there are none.
+    pub(super) fn turn_over(&mut self, angle_deg: f64) -> bool {
+        let (usual, turn) = (&mut self.usual, self.plan.scale);
+        let whole = |points: f64| points - turn * folded(points / turn);
+        let jump = whole(angle_deg * self.plan.points_per_deg - usual.base - usual.next);
+        let past = whole(usual.next - 0.5 * turn);
+        if jump.abs() < f64::MAX {
+            usual.base += jump + past;
+            usual.next -= past;
+            usual.first -= past;
+        }
+        usual.left > 0
     }
 
     /// Idle as long as it has never been started: the command is the target. False when that is no number.

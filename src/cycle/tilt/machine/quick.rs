@@ -1,19 +1,17 @@
-//! The usual cycle: in the cut within a block, or with the offsets in force and z following the path, or at rest.
+//! The usual cycle: in the cut within a block, or with all offsets but z's at rest and z following the path, or at rest.
 //!
 //! It does what any other cycle would do, without asking for all that can happen. After any other cycle that one says what
 //! the next can be, and in the cut for how many more.
 
 use super::*;
 
-/// What a usual cycle is now.
+/// What a usual cycle is now, where z does not follow the path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Usual {
     /// There is none.
     None,
     /// In the cut.
     Cut,
-    /// With all offsets but z's at rest.
-    Active,
     /// Not busy.
     Rest,
 }
@@ -41,6 +39,7 @@ impl Tilt {
     #[inline(never)]
     fn careful(&mut self, input: &TiltInput, output: &mut TiltOutput) -> i32 {
         // What usual cycles in the cut have put off.
+        self.unfollow();
         let done = self.granted - self.alike;
         self.cut_left -= done;
         self.block.count(done);
@@ -51,18 +50,26 @@ impl Tilt {
         output.status
     }
 
+    /// Ends the usual cycles in which z follows the path.
+    pub(super) fn unfollow(&mut self) {
+        if self.following {
+            self.followers[2].meant();
+            self.following = false;
+        }
+    }
+
     /// Says what the next cycles can be.
     fn see_usual(&mut self) {
+        self.following = self.phase == Phase::Active && self.settled;
+        if self.following {
+            let z = &self.plan.linear;
+            self.bounds = [[self.plan.most_mm, z.speed], [HUGE, z.acceleration]].map(f64x2::new);
+        }
         self.usual = match self.phase {
             Phase::Measuring if self.cutting => {
                 self.granted = self.block.most_more().min(self.cut_left);
                 self.alike = self.granted;
                 if self.granted > 0 { Usual::Cut } else { Usual::None }
-            }
-            Phase::Active if self.settled => {
-                let z = &self.plan.linear;
-                self.bounds = [[self.plan.most_mm, z.speed], [HUGE, z.acceleration]].map(f64x2::new);
-                Usual::Active
             }
             Phase::Idle | Phase::Done | Phase::Failed => Usual::Rest,
             _ => Usual::None,
@@ -72,31 +79,37 @@ impl Tilt {
     /// Does this cycle if it is a usual one; else returns false with nothing changed.
     #[inline(always)]
     fn quick(&mut self, input: &TiltInput) -> bool {
-        if self.usual == Usual::Cut {
-            if input.flags != GIB_TILT_INPUT_CUTTING || !sound(input) || !self.block.usual(&self.plan, input) {
-                return false;
-            }
-            self.alike -= 1;
-            if self.alike == 0 {
-                self.usual = Usual::None;
-            }
-            true
-        } else if self.usual == Usual::Active {
-            let target = self.z_target(input);
-            let [_, _, z, ..] = &mut self.followers;
-            let [step, change] = z.onto(target);
-            // Comparisons with what is no number are false.
-            let [near, slow] = self.bounds;
-            let near = f64x2::new([target, step]).abs().simd_le(near);
-            let slow = f64x2::new([sum(input), change]).abs().simd_le(slow);
-            let met = (near & slow).to_bitmask() == 3 && input.flags & !GIB_TILT_INPUT_CUTTING == 0;
-            if met {
-                z.land(target, step);
-                self.output.offset_mm[2] = target;
-            }
-            met
-        } else {
-            self.usual == Usual::Rest
+        if self.following {
+            return self.quick_z(input);
         }
+        if self.usual != Usual::Cut {
+            return self.usual == Usual::Rest;
+        }
+        if input.flags != GIB_TILT_INPUT_CUTTING || !sound(input) || !self.block.usual(&self.plan, input) {
+            return false;
+        }
+        self.alike -= 1;
+        if self.alike == 0 {
+            self.usual = Usual::None;
+        }
+        true
+    }
+
+    /// Z steps onto the path's plane, with all other offsets at rest; false where it may not.
+    #[inline(always)]
+    fn quick_z(&mut self, input: &TiltInput) -> bool {
+        let target = self.z_target(input);
+        let [_, _, z, ..] = &mut self.followers;
+        let [step, change] = z.onto(target);
+        // Comparisons with what is no number are false.
+        let [near, slow] = self.bounds;
+        let near = f64x2::new([target, step]).abs().simd_le(near);
+        let slow = f64x2::new([sum(input), change]).abs().simd_le(slow);
+        let met = (near & slow).to_bitmask().wrapping_sub(3) | input.flags & !GIB_TILT_INPUT_CUTTING == 0;
+        if met {
+            z.land(target, step);
+            self.output.offset_mm[2] = target;
+        }
+        met
     }
 }
