@@ -5247,7 +5247,7 @@ int32_t gib_inertia_last_error(const struct gib_inertia *handle, struct gib_erro
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
  *
- * @return the size in bytes, about 50 KiB.
+ * @return the size in bytes, about 80 KiB.
  *
  * [thread: any] [real-time: yes] [state: any]
  */

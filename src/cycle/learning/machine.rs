@@ -54,6 +54,8 @@ enum Phase {
 
 /// Share of a cycle's turn in the speed that says whether the spindle turns.
 const SPEED_SHARE: f64 = 0.05;
+/// A deviation that is no deviation but the lack of a position, mm.
+const NOWHERE: f64 = 1e12;
 /// Points that a cycle empties.
 const EMPTIED: usize = 8;
 /// Added and taken away, this leaves nothing that could become subnormal.
@@ -311,7 +313,7 @@ impl Learning {
         if self.rate.abs() < self.plan.rate_min {
             self.reasons |= GIB_LEARNING_NO_ROTATION;
         }
-        if !left.is_finite() {
+        if !(left.abs() < NOWHERE) {
             self.reasons |= GIB_LEARNING_NOT_DETECTED;
         } else if left.abs() > self.plan.deviation && self.phase != Phase::Stopping {
             let (value, most) = (1e3 * left, 1e3 * self.plan.deviation);

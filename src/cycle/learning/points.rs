@@ -6,8 +6,7 @@
 use super::config::GIB_LEARNING_POINTS;
 
 /// Entries of a table: a power of two, so that an entry's number needs no check.
-pub const ENTRIES: usize = GIB_LEARNING_POINTS;
-const _: () = assert!(ENTRIES.is_power_of_two());
+pub const ENTRIES: usize = GIB_LEARNING_POINTS.next_power_of_two();
 /// Adding this rounds a number to a whole one, which then stands in the lowest bits.
 const ROUNDING: f64 = 1.5 * (1u64 << 52) as f64;
 

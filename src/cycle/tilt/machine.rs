@@ -22,7 +22,7 @@ use super::trace::Trace;
 use super::verdict::*;
 use crate::cycle::backlash::io::{GIB_INPUT_ABORT, GIB_INPUT_FAULT};
 use crate::error::*;
-use quick::Usual;
+use quick::{HUGE, Usual, sound};
 use wide::f64x2;
 
 /// Where the machine is. Each comment says what ends the state.
@@ -130,20 +130,6 @@ impl Default for Tilt {
             trace: Trace::default(),
         }
     }
-}
-
-/// Beyond any machine; squares and sums of smaller numbers stay finite.
-const HUGE: f64 = 1e12;
-
-/// Whether every number of an input is finite and not huge. Comparisons with NaN are false.
-#[inline(always)]
-fn sound(input: &TiltInput) -> bool {
-    let [x, y, z] = input.position_mm;
-    let [a, b, c] = input.rotary_deg;
-    let (load, speed) = (input.load, input.speed_rpm);
-    // In pairs, which one instruction can square.
-    let (even, odd) = ((x * x + z * z) + (b * b + load * load), (y * y + a * a) + (c * c + speed * speed));
-    even + odd < HUGE * HUGE
 }
 
 impl Tilt {

@@ -16,6 +16,20 @@ pub enum Usual {
     Rest,
 }
 
+/// Beyond any machine; squares and sums of smaller numbers stay finite.
+pub const HUGE: f64 = 1e12;
+
+/// Whether every number of an input is finite and not huge. Comparisons with NaN are false.
+#[inline(always)]
+pub fn sound(input: &TiltInput) -> bool {
+    let [x, y, z] = input.position_mm;
+    let [a, b, c] = input.rotary_deg;
+    let (load, speed) = (input.load, input.speed_rpm);
+    // In pairs, which one instruction can square.
+    let (even, odd) = ((x * x + z * z) + (b * b + load * load), (y * y + a * a) + (c * c + speed * speed));
+    even + odd < HUGE * HUGE
+}
+
 /// Of all numbers of an input: no number where one of them is none.
 #[inline(always)]
 fn sum(input: &TiltInput) -> f64 {
