@@ -222,7 +222,7 @@ pub unsafe extern "C" fn gib_inertia_abort(handle: *mut GibInertia) -> i32 {
     })
 }
 
-/// Fits what was gathered, off the cycle: takes some milliseconds.
+/// Fits what was gathered, off the cycle: takes 10 to 150 ms.
 ///
 /// The report is written also when the value cannot be used; it then says which ramp would do.
 ///

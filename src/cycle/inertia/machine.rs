@@ -134,7 +134,7 @@ impl Inertia {
         self.gather.blocks()
     }
 
-    /// Fits what was gathered. Off the cycle: takes a millisecond or so.
+    /// Fits what was gathered. Off the cycle: takes 10 to 150 ms.
     ///
     /// # Errors
     /// `GIB_ERR_STATE` unless done; in the second place why the value cannot be used.

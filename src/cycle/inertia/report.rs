@@ -62,7 +62,7 @@ pub struct InertiaReport {
 }
 
 impl InertiaReport {
-    /// Fits blocks of `length` samples and takes the machine's own inertia off. Off the cycle: a millisecond or so.
+    /// Fits blocks of `length` samples and takes the machine's own inertia off. Off the cycle: 10 to 150 ms.
     ///
     /// # Errors
     /// In the second place why the value cannot be used; the report then holds what is known all the same.
