@@ -253,11 +253,11 @@ impl<'f, 'a> Bench<'f, 'a> {
             }
         }
         // A direction of which the other rows know nothing stays as it was.
-        let change = normal.pseudo_inverse(1e-3).unwrap_or_else(|_| DMatrix::zeros(k, k)) * right;
+        let change = pseudo_inverse(normal, 1e-3).unwrap_or_else(|| DMatrix::zeros(k, k)) * right;
         let triangle = DMatrix::from_fn(columns.len(), columns.len(), |i, j| dot(&basis[free + i], columns[j]));
         let change = DVector::from_fn(columns.len(), |i, _| change[free + i]);
         let change =
-            triangle.pseudo_inverse(1e-12).map_or_else(|_| DVector::zeros(columns.len()), |inverse| inverse * change);
+            pseudo_inverse(triangle, 1e-12).map_or_else(|| DVector::zeros(columns.len()), |inverse| inverse * change);
         let mut change = change.iter();
         fit.coefficients.iter().map(|own| own.iter().map(|c| c - change.next().unwrap_or(&0.0)).collect()).collect()
     }
@@ -419,6 +419,14 @@ fn channel_squares(residual: &[f64], rows: usize) -> Vec<f64> {
     let (torque, table) = residual.split_at(rows.min(residual.len()));
     let mean = |part: &[f64]| dot(part, part) / part.len() as f64;
     if table.is_empty() { vec![mean(torque)] } else { vec![mean(torque), mean(table)] }
+}
+
+/// The inverse of what a matrix does above `least`; `None` where it is not finite, on which the decomposition would never end.
+#[must_use]
+pub fn pseudo_inverse(matrix: DMatrix<f64>, least: f64) -> Option<DMatrix<f64>> {
+    let finite = matrix.iter().all(|value| value.is_finite());
+    let decomposed = finite.then(|| nalgebra::SVD::try_new(matrix, true, true, 5.0 * f64::EPSILON, 1000))??;
+    decomposed.pseudo_inverse(least).ok()
 }
 
 /// Scalar product.

@@ -93,6 +93,7 @@ pub struct Frame<'a> {
     stroke: (f64, f64),
     /// Weights of the whole filter of what is smooth between rows, of the measured torque, and of the low-pass alone; odd.
     kernel: Vec<f64>,
+    instant_kernel: Vec<f64>,
     torque_kernel: Vec<f64>,
     low_pass_kernel: Vec<f64>,
 }
@@ -108,7 +109,10 @@ impl<'a> Frame<'a> {
         let grid = crate::analysis::statistics::grid(&columns.position).unwrap_or(0.0);
         let scatter = crate::analysis::statistics::white_noise(&columns.position).unwrap_or(0.0);
         let position_noise = (grid / 12f64.sqrt()).max(scatter);
-        let torque_noise = crate::analysis::statistics::white_noise(&columns.torque).unwrap_or(0.0);
+        // Torque on a coarse grid may stand still for most rows, and seems to have no noise at all.
+        let torque_grid = crate::analysis::statistics::grid(&columns.torque).unwrap_or(0.0);
+        let scatter_of_torque = crate::analysis::statistics::white_noise(&columns.torque).unwrap_or(0.0);
+        let torque_noise = scatter_of_torque.max(torque_grid / 12f64.sqrt());
         let low_pass = LowPass {
             width: width.unwrap_or_else(|| fit_width(position_noise * unit * belief.inertia / (h * h), torque_noise)),
         };
@@ -125,6 +129,7 @@ impl<'a> Frame<'a> {
         let torque = low_pass.run(&of_three(&columns.torque, sampling.weights, stretches), stretches);
         let low_pass_kernel = low_pass.kernel();
         let kernel = convolve(&low_pass_kernel, &NUMEROV);
+        let instant_kernel = convolve(&kernel, &mean_of_rows(columns.period_s / columns.recorded_period_s));
         let torque_kernel = convolve(&low_pass_kernel, &sampling.weights);
         let mut doubt = doubtful_rows(columns, resting, resolution);
         let creeping = CREEPING * v.iter().fold(0.0f64, |m, v| m.max(v.abs())).max(1e-300);
@@ -172,6 +177,7 @@ impl<'a> Frame<'a> {
             torque,
             stroke: columns.position.iter().fold((f64::MAX, f64::MIN), |(lo, hi), x| (x.min(lo), x.max(hi))),
             kernel,
+            instant_kernel,
             torque_kernel,
             low_pass_kernel,
         }
@@ -181,6 +187,12 @@ impl<'a> Frame<'a> {
     #[must_use]
     pub fn judged(&self, values: &[f64]) -> Vec<f64> {
         self.weighed(values, &self.kernel, 0)
+    }
+
+    /// The same of what is known at the instant of each row, where a row is the mean of several that were recorded.
+    #[must_use]
+    pub fn judged_instants(&self, values: &[f64]) -> Vec<f64> {
+        self.weighed(values, &self.instant_kernel, 0)
     }
 
     /// A column of table − encoder, or of means that are already triangular ones over a row to either side, filtered, at the
@@ -308,6 +320,12 @@ impl<'a> Frame<'a> {
             })
             .collect()
     }
+}
+
+/// The mean of so many recorded rows to one, of what is smooth: its second moment, (1 − 1/n²)/12 rows².
+fn mean_of_rows(many: f64) -> [f64; 3] {
+    let side = (1.0 - 1.0 / (many * many)) / 24.0;
+    [side, 1.0 - 2.0 * side, side]
 }
 
 /// How sharply a column bends at each row (its second difference), beyond what its noise does: four deviations, by the median.

@@ -5,13 +5,13 @@
 //! when its gain is a fair share of what is left, and is borne out on held-out contiguous blocks: the coefficients are
 //! fitted without a block and judged on it.
 
+use super::blocks;
 use super::causes::Law;
-use super::fit::{Bench, Fit, Part, dot, figure};
+use super::fit::{Bench, Fit, Part, figure};
 use super::progress::{Stopped, Watch};
 use super::uncertainty;
 use crate::machine::Cause;
 use std::collections::HashMap;
-use std::ops::Range;
 
 /// Sets that are carried on.
 const BEAM: usize = 2;
@@ -34,8 +34,9 @@ const NUMBER_PRICE: f64 = 0.003;
 /// Least mean over scatter of the blocks' gains, times √blocks. What only one block shows gives exactly 1 and may count: the
 /// others predicted it, or the gain held out would not be there.
 const LEAST_T: f64 = 0.9;
-/// Most of what a cause explains that one block may hold: an eighth.
-const PIECES: f64 = 8.0;
+
+/// Share of what a cause explains that one block may hold.
+const MOST_IN_A_BLOCK: f64 = 0.125;
 
 /// Least share of the variance that causes explain, found or believed, where a cause acts: a thirtieth in amplitude. No law
 /// holds more exactly on a machine.
@@ -139,8 +140,8 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     }
     let start = best.pop().unwrap_or_else(|| search.bench.fit(Vec::new()));
     // What only several numbers of the belief together explain, others may have imitated one by one.
-    let open = search.with_beliefs(&start);
-    let start = if price(&open) < price(&start) - 0.5 * LEAST_GAIN { idle_left_out(search, open)? } else { start };
+    let open = idle_left_out(search, search.with_beliefs(&start))?;
+    let start = if price(&open) < price(&start) { open } else { start };
     let fit = shrink(search.bench, start, search.watch)?;
     rivals.retain(|r| r.parts.len() == fit.parts.len() && !same_causes(r, &fit));
     Ok(Selection { fit, rivals })
@@ -315,67 +316,12 @@ fn doubtful(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
 
 /// Whether held-out blocks bear out what `full` gains over `less`.
 fn borne_out(bench: &Bench, less: &Fit, full: &Fit) -> bool {
-    let blocks = blocks_of(bench, less, full);
-    let (a, b) = (held_out(bench, less, &blocks), held_out(bench, full, &blocks));
+    let gained: Vec<f64> = less.residual.iter().zip(&full.residual).map(|(less, full)| less - full).collect();
+    let blocks = blocks::within(bench, &[gained], MOST_IN_A_BLOCK);
+    let (a, b) = (blocks::held_out(bench, less, &blocks), blocks::held_out(bench, full, &blocks));
     let gains: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
     let mean = gains.iter().sum::<f64>() / gains.len() as f64;
     let scatter = (gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (gains.len() as f64 - 1.0)).sqrt();
     let in_sample = (less.squares() - full.squares()) / gains.len() as f64;
     mean > 0.5 * in_sample && mean * (gains.len() as f64).sqrt() > LEAST_T * scatter
-}
-
-/// The frame's blocks, cut further where one holds more than a share of all that `full` explains beyond `less`: what happens
-/// in one place, as a single rapid in which the motor saturates, can only be told by one part of it from another.
-fn blocks_of(bench: &Bench, less: &Fit, full: &Fit) -> Vec<Range<usize>> {
-    let trace: Vec<f64> = less.residual.iter().zip(&full.residual).map(|(less, full)| (less - full).powi(2)).collect();
-    let piece = trace.iter().sum::<f64>() / PIECES;
-    let mut blocks = Vec::new();
-    for block in bench.frame.blocks.windows(2) {
-        let (mut begin, mut held) = (block[0], 0.0);
-        for row in block[0]..block[1] {
-            held += bench.pieces(row..row + 1).into_iter().flatten().map(|row| trace[row]).sum::<f64>();
-            if held > piece {
-                blocks.push(begin..row + 1);
-                (begin, held) = (row + 1, 0.0);
-            }
-        }
-        if begin < block[1] {
-            blocks.push(begin..block[1]);
-        }
-    }
-    blocks
-}
-
-/// Sum of squares of each block, predicted by coefficients that were fitted without it.
-fn held_out(bench: &Bench, fit: &Fit, blocks: &[Range<usize>]) -> Vec<f64> {
-    let basis = fit.basis();
-    (blocks.iter())
-        .map(|block| {
-            let pieces = bench.pieces(block.clone());
-            // With orthonormal columns U, the held-out residual is (1 − U_b·U_bᵀ)⁻¹·r_b: solved in the small space,
-            // r_b + U_b·(1 − U_bᵀ·U_b)⁻¹·U_bᵀ·r_b.
-            let k = basis.len();
-            let mut normal = nalgebra::DMatrix::<f64>::identity(k, k);
-            let mut right = nalgebra::DVector::<f64>::zeros(k);
-            for piece in &pieces {
-                for i in 0..k {
-                    right[i] += dot(&basis[i][piece.clone()], &fit.residual[piece.clone()]);
-                    for j in 0..k {
-                        normal[(i, j)] -= dot(&basis[i][piece.clone()], &basis[j][piece.clone()]);
-                    }
-                }
-            }
-            // nalgebra's decompositions do not take an empty matrix.
-            let solved = if k == 0 { None } else { normal.lu().solve(&right) };
-            let weights = solved.unwrap_or_else(|| nalgebra::DVector::zeros(k));
-            let mut sum = 0.0;
-            for piece in pieces {
-                for row in piece {
-                    let fitted: f64 = (0..k).map(|i| basis[i][row] * weights[i]).sum();
-                    sum += (fit.residual[row] + fitted).powi(2);
-                }
-            }
-            sum
-        })
-        .collect()
 }

@@ -7,12 +7,16 @@
 //! stated is that of a normal distribution whose 95 % are as wide as those of Student's with as many degrees of freedom as
 //! blocks effectively take part (Imbens and Kolesár 2016).
 
-use super::fit::{Bench, Fit, Part, Slope, dot};
+use super::blocks;
+use super::fit::{Bench, Fit, Part, Slope, dot, pseudo_inverse};
 use crate::machine::Effect;
 use nalgebra::{DMatrix, DVector};
 
 /// How exactly a law holds, as a share of its size: sampling, filter and the law itself are no better.
 const LAW_HOLDS: f64 = 1e-3;
+
+/// Share of an unknown's column that one block may hold: leaving out a block that holds all of it would not move it.
+const MOST_IN_A_BLOCK: f64 = 0.5;
 
 /// Unknowns of a fit, as columns of its equations: coefficients of all parts in order, then the non-linear parameters.
 struct Unknowns<'s> {
@@ -56,7 +60,7 @@ pub fn strengths(bench: &Bench, fit: &Fit) -> Vec<f64> {
         let covariance =
             DMatrix::from_fn(c.len(), c.len(), |i, j| spread.covariance(first + i, first + j) * unit(i) * unit(j));
         let one = DVector::from_element(c.len(), 1.0);
-        let square = covariance.pseudo_inverse(1e-300).map_or(0.0, |inverse| one.dot(&(inverse * &one)));
+        let square = pseudo_inverse(covariance, 1e-300).map_or(0.0, |inverse| one.dot(&(inverse * &one)));
         let widening = (0..c.len()).map(|k| spread.widening(&alone(first + k)));
         square.max(0.0).sqrt() / widening.fold(1.0, f64::max)
     };
@@ -111,9 +115,10 @@ pub fn effects(bench: &Bench, fit: &Fit) -> Vec<Option<(Effect, Vec<f64>)>> {
             let widened = if part.law.simulated { misfit } else { 1.0 };
             let own = coefficient_at[i]..coefficient_at[i] + fit.coefficients[i].len();
             let deviation = |k: usize| {
-                let size =
+                let by_coefficients =
                     own.clone().zip(&fit.coefficients[i]).map(|(u, c)| (gradient[(k, u)] * c).powi(2)).sum::<f64>();
-                (widened * spread.deviation(&gradient.row(k).transpose())).hypot(LAW_HOLDS * size.sqrt())
+                let size = if own.is_empty() { values[k].abs() } else { by_coefficients.sqrt() };
+                (widened * spread.deviation(&gradient.row(k).transpose())).hypot(LAW_HOLDS * size)
             };
             let deviations = (0..values.len()).map(deviation).collect();
             Some((effect, deviations))
@@ -159,13 +164,16 @@ impl Spread {
                 c
             })
             .collect();
-        let scales: Vec<f64> = cleared.iter().map(|c| dot(c, c).sqrt().max(1e-300)).collect();
+        // A column of nothing keeps its zeros.
+        let scales: Vec<f64> = (cleared.iter().map(|c| dot(c, c).sqrt()))
+            .map(|length| if length > 1e-140 { length } else { 1.0 })
+            .collect();
         let normal = DMatrix::from_fn(k, k, |i, j| dot(&cleared[i], &cleared[j]) / (scales[i] * scales[j]));
-        let pseudo = |m: &DMatrix<f64>| m.clone().pseudo_inverse(1e-10).unwrap_or_else(|_| DMatrix::identity(k, k));
+        let pseudo = |m: &DMatrix<f64>| pseudo_inverse(m.clone(), 1e-10).unwrap_or_else(|| DMatrix::identity(k, k));
         let inverse = pseudo(&normal);
         let (mut moves, mut shares) = (Vec::new(), Vec::new());
-        for block in bench.frame.blocks.windows(2) {
-            let pieces = bench.pieces(block[0]..block[1]);
+        for block in blocks::within(bench, &cleared, MOST_IN_A_BLOCK) {
+            let pieces = bench.pieces(block);
             let over = |a: &[f64], b: &[f64]| pieces.iter().map(|p| dot(&a[p.clone()], &b[p.clone()])).sum::<f64>();
             let own = DMatrix::from_fn(k, k, |i, j| over(&cleared[i], &cleared[j]) / (scales[i] * scales[j]));
             let score = DVector::from_fn(k, |i, _| over(&cleared[i], &fit.residual) / scales[i]);

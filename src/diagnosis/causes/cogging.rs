@@ -13,7 +13,7 @@ pub static LAW: Law = Law {
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let (sine, cosine) = periods::waves(frame, shape[0]);
-            let (sine, cosine) = (frame.judged(&sine), frame.judged(&cosine));
+            let (sine, cosine) = (frame.judged_instants(&sine), frame.judged_instants(&cosine));
             Term { fixed: None, regressors: vec![Trace::torque(sine), Trace::torque(cosine)] }
         })
     },

@@ -15,7 +15,7 @@ pub static LAW: Law = Law {
             let rows = 0..frame.x.len();
             let (sine, cosine): (Vec<f64>, Vec<f64>) =
                 rows.map(|i| periods::sine_cosine(per_second * frame.seconds(i))).unzip();
-            let (sine, cosine) = (frame.judged(&sine), frame.judged(&cosine));
+            let (sine, cosine) = (frame.judged_instants(&sine), frame.judged_instants(&cosine));
             Term { fixed: None, regressors: vec![Trace::torque(sine), Trace::torque(cosine)] }
         })
     },
