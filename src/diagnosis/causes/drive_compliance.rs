@@ -34,7 +34,10 @@ pub static LAW: Law = Law {
         let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(frame, shape)).collect();
         table_side::terms(frame, &effects)
     },
-    effect: |frame, shape, _| effect(frame, shape),
+    effect: |frame, shape, _| {
+        let swings = shape.last().is_some_and(|damping_ratio| *damping_ratio < 0.9 * MOST_DAMPING);
+        effect(frame, shape).filter(|_| swings)
+    },
     confused_with: &[Cause::InertiaMismatch, Cause::Backlash, Cause::PreslidingFriction],
     sentence: |effect, axis| match effect {
         Effect::DriveCompliance { resonance_hz, stiffness_n_um, .. } => format!(
@@ -52,6 +55,5 @@ fn effect(frame: &Frame, shape: &[f64]) -> Option<Effect> {
     let omega: f64 = TAU * resonance_hz;
     let stiffness = omega * omega * frame.belief.inertia * share * (1.0 - share);
     let stiffness_n_um = stiffness / frame.axis.drive.motor_stiffness(1.0);
-    let swings = damping_ratio < MOST_DAMPING;
-    swings.then_some(Effect::DriveCompliance { resonance_hz, stiffness_n_um, table_friction_share, damping_ratio })
+    Some(Effect::DriveCompliance { resonance_hz, stiffness_n_um, table_friction_share, damping_ratio })
 }
