@@ -37,11 +37,11 @@ typedef struct {
 } tally;
 
 /* Runs with a tilt in every direction; only measured. `count` passes of the raster. */
-static tally runs_of(const tilt_plant_config *base, double tilt_deg, int runs, const tilt_pass *passes, int count)
+static tally runs_of_cuts(const tilt_plant_config *base, double tilt_deg, int runs, const tilt_pass *passes, int count, int cuts)
 {
     gib_tilt_table table;
     tally t = {.runs = runs};
-    if (tilt_teach(*base, gib, 0.5, 6.0, 0.5, &table) != GIB_DONE) {
+    if (tilt_teach_again(*base, gib, 0.5, 6.0, 0.5, cuts, &table) != GIB_DONE) {
         t.failed = runs;
         return t;
     }
@@ -74,6 +74,11 @@ static tally runs_of(const tilt_plant_config *base, double tilt_deg, int runs, c
         t.covered += fit <= r.uncertainty_deg;
     }
     return t;
+}
+
+static tally runs_of(const tilt_plant_config *base, double tilt_deg, int runs, const tilt_pass *passes, int count)
+{
+    return runs_of_cuts(base, tilt_deg, runs, passes, count, 1);
 }
 
 static void line_of(const char *what, const tally *t, double tilt_deg, int judged)
@@ -126,6 +131,8 @@ static void accuracy(int runs)
     c.noise_time_s = 0.02;
     t = runs_of(&c, 0.5, runs, passes, TILT_PASSES);
     line_of("noise slower, 20 ms", &t, 0.5, 0);
+    t = runs_of_cuts(&c, 0.5, runs, passes, TILT_PASSES, 16);
+    line_of("  and 16 cuts a row", &t, 0.5, 1);
     c = tilt_plant_default();
     t = runs_of(&c, 0.5, runs, passes, 1);
     line_of("one pass, wear unknown", &t, 0.5, 0);
@@ -139,8 +146,9 @@ static double between(uint64_t *random, double low, double high)
     return low + (high - low) * tilt_plant_uniform(random);
 }
 
-/* Machines drawn at random, each with a table of its own: how often the uncertainty holds the truth. */
-static void coverage(int plants, uint64_t seed)
+/* Machines drawn at random, each with a table of its own: how often the uncertainty holds the truth. With slow noise a reading
+   tells less, in the table's cuts too: that the uncertainty has to say. */
+static void coverage(int plants, uint64_t seed, int slow)
 {
     static const double BANDS[2] = {0.88, 1.0};
     uint64_t random = seed;
@@ -161,6 +169,9 @@ static void coverage(int plants, uint64_t seed)
         c.wear_1_m = between(&random, 0.0, 0.08);
         c.chips_1_s = between(&random, 0.0, 0.5);
         c.seed = seed + 31u * (uint64_t)i;
+        if (slow) {
+            c.noise_time_s = 0.002 * pow(10.0, tilt_plant_uniform(&random));
+        }
         tilt_pass passes[TILT_PASSES];
         tilt_raster(&c, passes);
         gib_tilt_table table;
@@ -169,7 +180,7 @@ static void coverage(int plants, uint64_t seed)
         tilt_kernel k = {.plant = &p, .gib = gib};
         gib_tilt_config g = tilt_config(&c);
         g.purpose = GIB_TILT_MEASURE_ONLY;
-        int32_t taught = tilt_teach(c, gib, 0.25, 6.25, 0.5, &table);
+        int32_t taught = tilt_teach_again(c, gib, 0.25, 6.25, 0.5, slow ? 4 : 1, &table);
         c.about_x_deg = tilt * sin(toward);
         c.about_y_deg = tilt * cos(toward);
         tilt_plant_init(&p, &c);
@@ -186,13 +197,13 @@ static void coverage(int plants, uint64_t seed)
         covered[2] += fabs(r.about_y_deg - tilt_plant_about(&p, 1)) <= r.about_y_uncertainty_deg;
         within += error <= fmax(0.05 * truth, 0.01);
     }
-    printf("%d machines at random (seed %llu): size, curve, speed, signal, noise 1 to 5 %%, wear to 8 %% a metre, chips, tilt\n"
-           "0.05 to 2 deg, each with a table of its own. Truth within U (k = 2): tilt %d, about x %d, about y %d;\n"
+    printf("%d machines at random (seed %llu): size, curve, speed, signal, noise 1 to 5 %%%s, wear to 8 %% a metre,\n"
+           "chips, tilt 0.05 to 2 deg, each with a table of its own. Truth within U (k = 2): tilt %d, about x %d, about y %d;\n"
            "error within 5 %% or 0.01 deg: %d; refused: %d.",
-           plants, (unsigned long long)seed, covered[0], covered[1], covered[2], within, failed);
-    int good = failed == 0 && within >= 0.95 * plants;
+           plants, (unsigned long long)seed, slow ? ", slower, 2 to 20 ms" : "", covered[0], covered[1], covered[2], within, failed);
+    int good = failed == 0 && within >= (slow ? 0.7 : 0.95) * plants;
     for (int i = 0; i < 3; i++) {
-        good = good && covered[i] >= BANDS[0] * plants && covered[i] <= BANDS[1] * plants;
+        good = good && covered[i] >= (slow ? 0.8 : BANDS[0]) * plants && covered[i] <= BANDS[1] * plants;
     }
     printf("%s\n\n", good ? "" : "   NOT AS IT MUST BE");
     bad += !good;
@@ -274,7 +285,8 @@ int main(int argc, char **argv)
     gib = gib_tilt_new();
     published();
     accuracy(runs);
-    coverage(plants, seed);
+    coverage(plants, seed, 0);
+    coverage(plants / 2, seed, 1);
     compensation();
     gib_tilt_free(gib);
     printf(bad ? "%d results are not as they must be\n" : "all as it must be\n", bad);

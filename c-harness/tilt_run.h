@@ -118,9 +118,9 @@ static inline double tilt_plane_error(tilt_kernel *k, const tilt_pass *passes, i
     return k->most_mm - k->least_mm;
 }
 
-/* Cuts of known depth on a true workpiece make a table; returns the first status that is no GIB_DONE. */
-static inline int32_t tilt_teach(tilt_plant_config c, gib_tilt *gib, double from_mm, double to_mm, double step_mm,
-                                 gib_tilt_table *table)
+/* Cuts of known depth on a true workpiece, so many a row, make a table; returns the first status that is no GIB_DONE. */
+static inline int32_t tilt_teach_again(tilt_plant_config c, gib_tilt *gib, double from_mm, double to_mm, double step_mm,
+                                       int cuts, gib_tilt_table *table)
 {
     gib_tilt_config g = tilt_config(&c);
     memset(table, 0, sizeof *table);
@@ -129,7 +129,8 @@ static inline int32_t tilt_teach(tilt_plant_config c, gib_tilt *gib, double from
     table->signal = g.signal;
     g.purpose = GIB_TILT_TEACH;
     c.about_x_deg = c.about_y_deg = c.wear_1_m = 0.0; /* a sharp tool on a true workpiece */
-    for (double depth = from_mm; depth < to_mm + 1e-9; depth += step_mm) {
+    for (int cut = 0; from_mm + cut / cuts * step_mm < to_mm + 1e-9; cut++) {
+        double depth = from_mm + cut / cuts * step_mm;
         tilt_plant p;
         tilt_pass passes[TILT_PASSES];
         tilt_kernel k = {.plant = &p, .gib = gib};
@@ -152,6 +153,13 @@ static inline int32_t tilt_teach(tilt_plant_config c, gib_tilt *gib, double from
         }
     }
     return GIB_DONE;
+}
+
+/* The same with one cut a row. */
+static inline int32_t tilt_teach(tilt_plant_config c, gib_tilt *gib, double from_mm, double to_mm, double step_mm,
+                                 gib_tilt_table *table)
+{
+    return tilt_teach_again(c, gib, from_mm, to_mm, step_mm, 1, table);
 }
 
 /* From the start to the offsets in force, or to the end without. */
