@@ -17,7 +17,7 @@ use super::motion::{Motion, cubic_at, smoothed};
 use super::observed::Observed;
 use super::physics::{Physics, Ripple};
 use crate::machine::{Axis, TwoMasses};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SVD};
 use std::ops::Range;
 
 /// A predicted torque and what it took to predict it.
@@ -264,11 +264,32 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 
 /// Weights of the columns that come closest to the target; columns are scaled first, and useless ones get nothing.
 fn least_squares(columns: &[Vec<f64>], target: &[f64]) -> Option<Vec<f64>> {
-    let scales: Vec<f64> = columns.iter().map(|c| rms(c.iter().copied()).max(f64::MIN_POSITIVE)).collect();
+    let length = |c: &Vec<f64>| Some(rms(c.iter().copied())).filter(|length| *length > 1e-140).unwrap_or(1.0);
+    let scales: Vec<f64> = columns.iter().map(length).collect();
     let n = columns.len();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let normal = DMatrix::from_fn(n, n, |i, j| dot(&columns[i], &columns[j]) / (scales[i] * scales[j]));
     let right = DVector::from_fn(n, |i, _| dot(&columns[i], target) / scales[i]);
-    let solved = normal.svd(true, true).solve(&right, 1e-9 * target.len() as f64).ok()?;
+    // On what is not finite the decomposition would never end.
+    let finite = normal.iter().chain(right.iter()).all(|value| value.is_finite());
+    let decomposed = finite.then(|| SVD::try_new(normal, true, true, 5.0 * f64::EPSILON, 1000))??;
+    let solved = decomposed.solve(&right, 1e-9 * target.len() as f64).ok()?;
     Some(solved.iter().zip(scales).map(|(w, s)| w / s).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_of_nothing_gets_nothing_and_what_is_not_finite_has_no_answer() {
+        let columns = [vec![1.0; 8], vec![0.0; 8], (0..8).map(f64::from).collect()];
+        let target: Vec<f64> = (0..8).map(|i| 2.0 + 0.5 * f64::from(i)).collect();
+        let weights = least_squares(&columns, &target).unwrap();
+        assert!(
+            (weights[0] - 2.0).abs() < 1e-9 && weights[1].abs() < 1e-9 && (weights[2] - 0.5).abs() < 1e-9,
+            "{weights:?}"
+        );
+        assert!(least_squares(&[vec![f64::NAN; 8]], &target).is_none());
+    }
 }
