@@ -361,6 +361,8 @@ def tilt_followed():
     def spread(path):
         x, depth = columns(path, "x.program_position_mm", "work.depth_mm")
         there = [d for before, at, d in zip(x, x[1:], depth[1:]) if 23 < at < 47 and at > before and d > 0]
+        check(len(there) > 100, f"the cut is in the recording: {len(there)} of {len(x)} rows, x {min(x):.1f} to {max(x):.1f} mm, "
+              f"at most {max(depth):.3f} mm deep")
         return max(there) - min(there)
     mdi("M3 S600")
     mdi("G4 P1.5")
