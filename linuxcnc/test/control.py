@@ -55,6 +55,8 @@ def mdi(line, seconds=60):
     command.mode(linuxcnc.MODE_MDI)
     command.wait_complete()
     command.mdi(line)
+    # A busy machine may take its time; until then the control is idle from the line before.
+    wait(lambda: state().echo_serial_number >= command.serial, 10, f"{line} is taken")
     time.sleep(0.1)
     wait(idle, seconds, line)
 
