@@ -60,11 +60,7 @@ def counted():
     which nobody wants at once, since a speed is varied where what swings is not to be followed."""
     machine_on()
     home_all()
-    mdi("M3 S600")
-    mdi("G4 P1.5")
-    mdi("M117")
-    cut(50, 20)
-    mdi("M118")
+    cut_measured(lambda: cut(50, 20))
     mdi("M119 P1")
     wait(lambda: pin("gib-tilt.0.active"), 10, "z follows the workpiece")
     mdi("M68 E0 Q0.5")
@@ -356,6 +352,16 @@ def cut(*ways):
         mdi("M65 P0")
 
 
+def cut_measured(run):
+    """What `run` answers, which cuts while the tilt is measured."""
+    mdi("M3 S600")
+    mdi("G4 P1.5")
+    mdi("M117")
+    answer = run()
+    mdi("M118")
+    return answer
+
+
 def tilt_followed():
     """A workpiece that lies askew in x is cut twice: the depth along the path varies, and then does not."""
     def spread(path):
@@ -364,11 +370,7 @@ def tilt_followed():
         check(len(there) > 100, f"the cut is in the recording: {len(there)} of {len(x)} rows, x {min(x):.1f} to {max(x):.1f} mm, "
               f"at most {max(depth):.3f} mm deep")
         return max(there) - min(there)
-    mdi("M3 S600")
-    mdi("G4 P1.5")
-    mdi("M117")
-    before = spread(recorded(lambda: cut(50, 20)))
-    mdi("M118")
+    before = spread(cut_measured(lambda: recorded(lambda: cut(50, 20))))
     text, truth = told(), math.degrees(math.atan(pin("gib-sim-cut.0.slope-x")))
     check(abs(pin("gib-tilt.0.tilt") - truth) < max(0.02, pin("gib-tilt.0.uncertainty")),
           f"tilt {pin('gib-tilt.0.tilt'):.3f} deg, truth {truth:.3f}; {text}")
@@ -385,11 +387,7 @@ def tilt_turned_away():
     """The same workpiece on a machine that could turn it about y: b is told to, and nothing else. The mill has no b."""
     for name, value in (("rotary-axis-0", 2), ("rtcp", 1)):
         hal.set_p("gib-tilt.0." + name, str(value))
-    mdi("M3 S600")
-    mdi("G4 P1.5")
-    mdi("M117")
-    cut(50, 20)
-    mdi("M118")
+    cut_measured(lambda: cut(50, 20))
     mdi("M119 P1")
     truth = math.degrees(math.atan(pin("gib-sim-cut.0.slope-x")))
     turned, others = pin("gib-tilt.0.offset-b"), [pin("gib-tilt.0.offset-" + axis) for axis in "acxyz"]
@@ -397,7 +395,8 @@ def tilt_turned_away():
           f"b is told to turn by {turned:.3f} deg, truth {truth:.3f}, the others by {others}; {told()}")
     mdi("M119 P0")
     check(pin("gib-tilt.0.offset-b") == 0 and not pin("gib-tilt.0.busy"), f"and back; {told()}")
-    hal.set_p("gib-tilt.0.rotary-axis-0", "0")
+    for name in ("rotary-axis-0", "rtcp"):
+        hal.set_p("gib-tilt.0." + name, "0")
     mdi("M5")
 
 

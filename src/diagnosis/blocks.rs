@@ -38,16 +38,7 @@ pub fn held_out(bench: &Bench, fit: &Fit, blocks: &[Range<usize>]) -> Vec<f64> {
             // With orthonormal columns U, the held-out residual is (1 − U_b·U_bᵀ)⁻¹·r_b: solved in the small space,
             // r_b + U_b·(1 − U_bᵀ·U_b)⁻¹·U_bᵀ·r_b.
             let k = basis.len();
-            let mut normal = nalgebra::DMatrix::<f64>::identity(k, k);
-            let mut right = nalgebra::DVector::<f64>::zeros(k);
-            for piece in &pieces {
-                for i in 0..k {
-                    right[i] += dot(&basis[i][piece.clone()], &fit.residual[piece.clone()]);
-                    for j in 0..k {
-                        normal[(i, j)] -= dot(&basis[i][piece.clone()], &basis[j][piece.clone()]);
-                    }
-                }
-            }
+            let (normal, right) = fit.outside(pieces.iter().cloned());
             // nalgebra's decompositions do not take an empty matrix.
             let solved = if k == 0 { None } else { normal.lu().solve(&right) };
             let weights = solved.unwrap_or_else(|| nalgebra::DVector::zeros(k));

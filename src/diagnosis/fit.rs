@@ -6,6 +6,7 @@
 
 use super::causes::{Law, Rest, Scale, Term, Trace};
 use super::frame::Frame;
+use crate::plant::linear::decomposed;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 use std::sync::Arc;
@@ -239,19 +240,8 @@ impl<'f, 'a> Bench<'f, 'a> {
             return fit.coefficients.clone();
         }
         // On an orthonormal basis U the rest of the rows gives t − (1 − U_bᵀ·U_b)⁻¹·U_bᵀ·r_b in place of t = Uᵀ·y.
-        let mut normal = DMatrix::<f64>::identity(k, k);
-        let mut right = DVector::<f64>::zeros(k);
         let blocks = self.frame.blocks.windows(2).enumerate().filter(|(block, _)| left_out(*block));
-        for (_, ends) in blocks {
-            for piece in self.pieces(ends[0]..ends[1]) {
-                for i in 0..k {
-                    right[i] += dot(&basis[i][piece.clone()], &fit.residual[piece.clone()]);
-                    for j in 0..k {
-                        normal[(i, j)] -= dot(&basis[i][piece.clone()], &basis[j][piece.clone()]);
-                    }
-                }
-            }
-        }
+        let (normal, right) = fit.outside(blocks.flat_map(|(_, ends)| self.pieces(ends[0]..ends[1])));
         // A direction of which the other rows know nothing stays as it was.
         let change = pseudo_inverse(normal, 1e-3).unwrap_or_else(|| DMatrix::zeros(k, k)) * right;
         let triangle = DMatrix::from_fn(columns.len(), columns.len(), |i, j| dot(&basis[free + i], columns[j]));
@@ -397,6 +387,23 @@ impl Fit {
         &self.parts[part].columns
     }
 
+    /// What the rows outside some pieces know: 1 − U_bᵀ·U_b, and U_bᵀ·r_b, with the orthonormal columns U and the residual r.
+    #[must_use]
+    pub fn outside(&self, pieces: impl IntoIterator<Item = Range<usize>>) -> (DMatrix<f64>, DVector<f64>) {
+        let k = self.basis.len();
+        let (mut normal, mut right) = (DMatrix::identity(k, k), DVector::zeros(k));
+        for piece in pieces {
+            let own: Vec<&[f64]> = self.basis.iter().map(|column| &column[piece.clone()]).collect();
+            for i in 0..k {
+                right[i] += dot(own[i], &self.residual[piece.clone()]);
+                for j in 0..k {
+                    normal[(i, j)] -= dot(own[i], own[j]);
+                }
+            }
+        }
+        (normal, right)
+    }
+
     /// What a part adds, stacked and scaled.
     #[must_use]
     pub fn contribution(&self, part: usize) -> Vec<f64> {
@@ -421,12 +428,10 @@ fn channel_squares(residual: &[f64], rows: usize) -> Vec<f64> {
     if table.is_empty() { vec![mean(torque)] } else { vec![mean(torque), mean(table)] }
 }
 
-/// The inverse of what a matrix does above `least`; `None` where it is not finite, on which the decomposition would never end.
+/// The inverse of what a matrix does above `least`; `None` where it is not finite.
 #[must_use]
 pub fn pseudo_inverse(matrix: DMatrix<f64>, least: f64) -> Option<DMatrix<f64>> {
-    let finite = matrix.iter().all(|value| value.is_finite());
-    let decomposed = finite.then(|| nalgebra::SVD::try_new(matrix, true, true, 5.0 * f64::EPSILON, 1000))??;
-    decomposed.pseudo_inverse(least).ok()
+    decomposed(matrix)?.pseudo_inverse(least).ok()
 }
 
 /// Scalar product.

@@ -12,6 +12,7 @@ use super::fit::dot;
 use super::sampling::{NUMEROV, Sampling};
 use crate::machine::{Axis, Belief, Effect};
 use crate::plant::lateness::Lateness;
+use crate::plant::motion::{cubic_at, flattened_at};
 use std::ops::Range;
 
 /// Plain columns of one axis: what a diagnosis needs of a recording.
@@ -247,12 +248,7 @@ impl<'a> Frame<'a> {
         let late_s = self.believed_late_s + late_s;
         let shift = (self.sampled_late_s + late_s) / self.columns.period_s;
         let flattened = self.lateness.flattened_s2(late_s) / self.columns.period_s.powi(2);
-        let raised = |&i: &usize| {
-            let at = |k: f64| cubic_at(&self.torque, i as f64 + shift + k);
-            let bend = if flattened > 0.0 { at(-1.0) - 2.0 * at(0.0) + at(1.0) } else { 0.0 };
-            at(0.0) - flattened * bend
-        };
-        self.kept.iter().map(raised).collect()
+        self.kept.iter().map(|&i| flattened_at(&self.torque, i as f64 + shift, -flattened)).collect()
     }
 
     /// Noise floor of a filtered column at the judged rows, in its unit: what white noise through the filter would be,
@@ -337,11 +333,6 @@ fn beyond_noise(values: &[f64]) -> Vec<f64> {
     let bends: Vec<f64> = (0..values.len()).map(bend).collect();
     let noise = 4.0 * 1.4826 * crate::analysis::statistics::median(&bends).unwrap_or(0.0);
     bends.into_iter().map(|bend| (bend - noise).max(0.0)).collect()
-}
-
-/// Catmull–Rom cubic through equidistant values, held at the ends.
-fn cubic_at(values: &[f64], index: f64) -> f64 {
-    crate::plant::motion::cubic_at(values, index)
 }
 
 /// How late the torque column is believed to be beyond its sampling, s.

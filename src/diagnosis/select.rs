@@ -11,7 +11,7 @@ use super::fit::{Bench, Fit, Part, figure};
 use super::progress::{Stopped, Watch};
 use super::uncertainty;
 use crate::machine::Cause;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Sets that are carried on.
 const BEAM: usize = 2;
@@ -170,6 +170,14 @@ struct Child<'s> {
 }
 
 impl Child<'_> {
+    /// All causes of it.
+    fn causes(&self) -> Vec<Cause> {
+        let mut list = causes(self.set);
+        list.push(self.part.law.cause);
+        list.sort();
+        list
+    }
+
     /// The price that refining may reach.
     fn within_reach(&self) -> f64 {
         let before = price(self.set);
@@ -187,6 +195,9 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
     let mut children: Vec<Child> =
         watch.each(&open, (from, half), "looking for causes", look)?.into_iter().flatten().collect();
     children.sort_by(|a, b| a.price.total_cmp(&b.price));
+    // Two sets may grow into the same one, which is refined once, from where it costs less.
+    let mut seen = HashSet::new();
+    children.retain(|child| seen.insert(child.causes()));
     // What cannot come among those that are carried on need not be refined.
     let carried_on = children.get(BEAM - 1).map_or(f64::INFINITY, |child| child.price);
     let mut tried: HashMap<Vec<Cause>, usize> = HashMap::new();
@@ -205,12 +216,6 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
     })?;
     let mut grown: Vec<Fit> = refined.into_iter().flatten().collect();
     grown.sort_by(|a, b| price(a).total_cmp(&price(b)));
-    let mut seen: Vec<Vec<Cause>> = Vec::new();
-    grown.retain(|fit| {
-        let fresh = !seen.contains(&causes(fit));
-        seen.push(causes(fit));
-        fresh
-    });
     Ok(grown)
 }
 

@@ -5,6 +5,7 @@ pub mod closed_loop;
 mod coupling;
 pub mod friction;
 pub mod lateness;
+pub mod linear;
 pub mod motion;
 pub mod moves;
 pub mod noise;

@@ -122,6 +122,13 @@ pub fn cubic_at(values: &[f64], index: f64) -> f64 {
     b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
 }
 
+/// The same with this share of the second difference there added: flattened where positive, raised where negative.
+#[must_use]
+pub fn flattened_at(values: &[f64], index: f64, share: f64) -> f64 {
+    let at = |k: f64| cubic_at(values, index + k);
+    if share == 0.0 { at(0.0) } else { at(0.0) + share * (at(-1.0) - 2.0 * at(0.0) + at(1.0)) }
+}
+
 /// A regular series without what lies above a cut-off, unshifted: the band in which a [`Motion`] is known.
 #[must_use]
 pub fn smoothed(values: &[f64], period: f64, cutoff_hz: f64) -> Vec<f64> {

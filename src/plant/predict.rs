@@ -13,11 +13,12 @@
 use super::coupling::{longest_step_s, transmitted};
 use super::friction::Friction;
 use super::lateness::Lateness;
-use super::motion::{Motion, cubic_at, smoothed};
+use super::linear::decomposed;
+use super::motion::{Motion, cubic_at, flattened_at, smoothed};
 use super::observed::Observed;
 use super::physics::{Physics, Ripple};
 use crate::machine::{Axis, TwoMasses};
-use nalgebra::{DMatrix, DVector, SVD};
+use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
 
 /// A predicted torque and what it took to predict it.
@@ -62,9 +63,8 @@ pub fn predict_torque(axis: &Axis, observed: &Observed) -> Result<TorquePredicti
         }
         let part = &delivered[run.clone()];
         for i in 0..part.len() {
-            let at = |k: f64| cubic_at(part, i as f64 - shift + k);
-            let bend = if flattened > 0.0 { at(-1.0) - 2.0 * at(0.0) + at(1.0) } else { 0.0 };
-            torque[run.start + i] = if shift == 0.0 { part[i] } else { at(0.0) + flattened * bend };
+            torque[run.start + i] =
+                if shift == 0.0 { part[i] } else { flattened_at(part, i as f64 - shift, flattened) };
         }
     }
     Ok(TorquePrediction { torque, physics, phases_unknown })
@@ -270,10 +270,7 @@ fn least_squares(columns: &[Vec<f64>], target: &[f64]) -> Option<Vec<f64>> {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let normal = DMatrix::from_fn(n, n, |i, j| dot(&columns[i], &columns[j]) / (scales[i] * scales[j]));
     let right = DVector::from_fn(n, |i, _| dot(&columns[i], target) / scales[i]);
-    // On what is not finite the decomposition would never end.
-    let finite = normal.iter().chain(right.iter()).all(|value| value.is_finite());
-    let decomposed = finite.then(|| SVD::try_new(normal, true, true, 5.0 * f64::EPSILON, 1000))??;
-    let solved = decomposed.solve(&right, 1e-9 * target.len() as f64).ok()?;
+    let solved = decomposed(normal)?.solve(&right, 1e-9 * target.len() as f64).ok()?;
     Some(solved.iter().zip(scales).map(|(w, s)| w / s).collect())
 }
 
