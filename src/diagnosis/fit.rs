@@ -4,7 +4,12 @@
 //! Linear coefficients are projected out (orthonormal basis by modified Gram–Schmidt, twice); non-linear parameters go by
 //! Gauss–Newton with step halving on what is left (variable projection, Golub and Pereyra 1973).
 
-use super::causes::{Law, Rest, Scale, Term, Trace};
+mod slopes;
+mod smoothed;
+
+pub use slopes::Slope;
+
+use super::causes::{Law, Rest, Term, Trace};
 use super::frame::Frame;
 use crate::plant::linear::decomposed;
 use nalgebra::{DMatrix, DVector};
@@ -29,6 +34,8 @@ pub struct Bench<'f, 'a> {
     pub rows: usize,
     /// Orthonormal columns that are free in every fit: the zero of the table's scale.
     free: Vec<Vec<f64>>,
+    /// Judged rows that are summed to one; none where rows are as they are.
+    windows: Vec<Range<usize>>,
 }
 
 /// A cause in a fit.
@@ -78,17 +85,18 @@ impl<'f, 'a> Bench<'f, 'a> {
             level[rows..].fill(1.0 / (table.len() as f64).sqrt());
             free.push(level);
         }
-        let mut bench = Self { frame, measured, floors, known: Vec::new(), rows, free };
+        let mut bench = Self { frame, measured, floors, known: Vec::new(), rows, free, windows: Vec::new() };
         bench.known = bench.stack(&Trace { torque: effects, table: base.table.clone() });
         bench
     }
 
     fn stack(&self, trace: &Trace) -> Vec<f64> {
-        let mut column = vec![0.0; self.measured.len()];
+        let rows = self.frame.kept.len();
+        let mut column = vec![0.0; if self.frame.columns.table.is_some() { 2 * rows } else { rows }];
         let weighted = trace.torque.iter().zip(&self.frame.weights);
         column.iter_mut().zip(weighted).for_each(|(c, (t, w))| *c = w * t / self.floors[0]);
-        column.iter_mut().skip(self.rows).zip(&trace.table).for_each(|(c, t)| *c = t / self.floors[1]);
-        column
+        column.iter_mut().skip(rows).zip(&trace.table).for_each(|(c, t)| *c = t / self.floors[1]);
+        smoothed::summed(column, rows, &self.windows)
     }
 
     /// A cause at given non-linear parameters, once for each set of them.
@@ -257,96 +265,6 @@ impl<'f, 'a> Bench<'f, 'a> {
     pub fn pieces(&self, block: Range<usize>) -> Vec<Range<usize>> {
         let table = block.start + self.rows..block.end + self.rows;
         if self.measured.len() > self.rows { vec![block, table] } else { vec![block] }
-    }
-
-    /// How the model's sum changes with each non-linear parameter (in the units of its scale).
-    #[must_use]
-    pub fn slopes(&self, fit: &Fit, first: usize) -> Vec<Slope> {
-        let mut slopes = Vec::new();
-        for (i, part) in fit.parts.iter().enumerate().skip(first) {
-            // Up and down by a small step in each parameter, all worked out together.
-            let mut shapes = Vec::new();
-            let mut moves = Vec::new();
-            for (index, scale) in part.law.scales.iter().enumerate() {
-                let step = match *scale {
-                    Scale::Choice => continue,
-                    Scale::Log(..) => 0.02,
-                    Scale::Linear(_, _, step) => step,
-                };
-                let at = part.shape[index];
-                let (above, below) = (scale.moved(at, step), scale.moved(at, -step));
-                for value in [above, below] {
-                    let mut shape = part.shape.clone();
-                    shape[index] = value;
-                    shapes.push(shape);
-                }
-                moves.push((index, scale.distance(at, above), scale.distance(at, below)));
-            }
-            let mut sides = self.parts(part.law, shapes).into_iter();
-            for (index, above, below) in moves {
-                let (Some(up), Some(down)) = (sides.next(), sides.next()) else { break };
-                if above - below <= 0.0 {
-                    continue;
-                }
-                let per = 1.0 / (above - below);
-                let mut column = vec![0.0; self.measured.len()];
-                let mut add = |values: &[f64], factor: f64| {
-                    column.iter_mut().zip(values).for_each(|(c, v)| *c += factor * v);
-                };
-                if let (Some(up), Some(down)) = (&up.fixed, &down.fixed) {
-                    add(up, per);
-                    add(down, -per);
-                }
-                for ((up, down), c) in up.columns.iter().zip(down.columns.iter()).zip(&fit.coefficients[i]) {
-                    add(up, c * per);
-                    add(down, -c * per);
-                }
-                slopes.push(Slope { part: i, index, column });
-            }
-        }
-        slopes
-    }
-}
-
-/// The derivative of the model by one non-linear parameter.
-#[derive(Debug, Clone)]
-pub struct Slope {
-    /// Index of the part.
-    pub part: usize,
-    /// Index of the parameter.
-    pub index: usize,
-    /// The derivative, stacked and scaled.
-    pub column: Vec<f64>,
-}
-
-impl Scale {
-    /// The value moved by a step, within bounds.
-    #[must_use]
-    pub fn moved(self, at: f64, step: f64) -> f64 {
-        match self {
-            Scale::Choice => at,
-            // More than a doubling at once is no small step.
-            Scale::Log(low, high) => (at * step.clamp(-0.7, 0.7).exp()).clamp(low, high),
-            Scale::Linear(low, high, unit) => (at + step.clamp(-40.0 * unit, 40.0 * unit)).clamp(low, high),
-        }
-    }
-
-    fn distance(self, from: f64, to: f64) -> f64 {
-        match self {
-            Scale::Choice => 0.0,
-            Scale::Log(..) => (to / from).ln(),
-            Scale::Linear(..) => to - from,
-        }
-    }
-
-    /// Change of the value for a small step in the scale's own unit.
-    #[must_use]
-    pub fn rate(self, at: f64) -> f64 {
-        match self {
-            Scale::Choice => 0.0,
-            Scale::Log(..) => at,
-            Scale::Linear(..) => 1.0,
-        }
     }
 }
 

@@ -5,6 +5,7 @@
 //! when its gain is a fair share of what is left, and is borne out on held-out contiguous blocks: the coefficients are
 //! fitted without a block and judged on it.
 
+use super::approach::Approach;
 use super::blocks;
 use super::causes::Law;
 use super::fit::{Bench, Fit, Part, figure};
@@ -67,6 +68,7 @@ type Shelf = HashMap<Cause, Vec<Part>>;
 /// What stays the same while sets of causes grow.
 struct Search<'s, 'f, 'a> {
     bench: &'s Bench<'f, 'a>,
+    approach: &'s Approach<'f, 'a>,
     laws: &'s [&'static Law],
     shelf: Shelf,
     watch: &'s Watch<'s>,
@@ -93,7 +95,8 @@ pub fn select(
     suffices: impl Fn(&Selection) -> bool,
     watch: &Watch,
 ) -> Result<Selection, Stopped> {
-    let search = Search { bench, laws, shelf: shelf(bench, laws, watch)?, watch };
+    let approach = Approach::new(bench);
+    let search = Search { bench, approach: &approach, laws, shelf: shelf(bench, &approach, laws, watch)?, watch };
     let first = search_from(&search, bench.fit(Vec::new()))?;
     if suffices(&first) {
         return Ok(first);
@@ -102,7 +105,7 @@ pub fn select(
     Ok(if price(&second.fit) < price(&first.fit) { second } else { first })
 }
 
-fn shelf(bench: &Bench, laws: &[&'static Law], watch: &Watch) -> Result<Shelf, Stopped> {
+fn shelf(bench: &Bench, approach: &Approach, laws: &[&'static Law], watch: &Watch) -> Result<Shelf, Stopped> {
     let empty = bench.fit(Vec::new());
     // Few starts at a time, so that all cores have work on the laws that take long.
     let starts: Vec<(&'static Law, Vec<Vec<f64>>)> = laws
@@ -111,7 +114,8 @@ fn shelf(bench: &Bench, laws: &[&'static Law], watch: &Watch) -> Result<Shelf, S
         .flat_map(|&law| bench.starts(law, &empty).chunks(AT_A_TIME).map(|c| (law, c.to_vec())).collect::<Vec<_>>())
         .collect();
     let laid = watch.each(&starts, (0.05, 0.15), "laying out what each cause would do", |(law, shapes)| {
-        (law.cause, bench.parts(law, shapes.clone()))
+        let approached = Approach::suits(law);
+        (law.cause, if approached { approach.starts(law, shapes.clone()) } else { bench.parts(law, shapes.clone()) })
     })?;
     let mut shelf = Shelf::new();
     for (cause, parts) in laid {
@@ -221,13 +225,17 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
 
 /// A law where it explains most of what a set leaves, if that is worth refining.
 fn at_best_start<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Option<Child<'s>> {
-    let Search { bench, shelf, .. } = search;
+    let Search { bench, approach, shelf, .. } = search;
+    let shelved = || shelf.get(&law.cause).map_or(&[][..], Vec::as_slice);
     let fresh: Vec<Part>;
-    let parts: &[Part] = if law.starts_from_rest {
+    let parts: &[Part] = if Approach::suits(law) {
+        fresh = bench.parts(law, vec![approach.from(shelved(), set)?]);
+        &fresh
+    } else if law.starts_from_rest {
         fresh = bench.parts(law, bench.starts(law, set));
         &fresh
     } else {
-        shelf.get(&law.cause).map_or(&[], Vec::as_slice)
+        shelved()
     };
     let figure_with = |part: &Part| figure(&bench.joined(set, part)) + NUMBER_PRICE * part.shape.len() as f64;
     let (figure, part) = parts.iter().map(|part| (figure_with(part), part)).min_by(|a, b| a.0.total_cmp(&b.0))?;

@@ -1,0 +1,63 @@
+//! A clearance is approached from afar. Where its flanks meet hard, a width that is a tenth off puts every impact at a wrong time,
+//! and the sum of squares is so rugged that no start comes down to the right one. Summed over 50 ms it is the impulse of an
+//! impact that counts: the sum of squares falls from half and from twice the width. So the start is chosen and moved on sums,
+//! over shorter and shorter times.
+
+use super::causes::Law;
+use super::fit::{Bench, Fit, Part, dot, figure};
+use crate::machine::Cause;
+
+/// Times over which rows are summed, s, and how far apart the points of a slope are, in steps of each scale.
+const STAGES: [(f64, f64); 3] = [(0.05, 12.0), (0.02, 8.0), (0.006, 4.0)];
+/// Most moves in a stage.
+const MOVES: usize = 6;
+/// Least that a start, as large as it fits, takes off ln of the mean square of the sums for anything to be moved.
+const LEAST: f64 = 0.02;
+
+/// The stages of an approach.
+#[derive(Debug)]
+pub struct Approach<'f, 'a> {
+    stages: Vec<(Bench<'f, 'a>, f64)>,
+}
+
+impl<'f, 'a> Approach<'f, 'a> {
+    /// Of these equations.
+    #[must_use]
+    pub fn new(bench: &Bench<'f, 'a>) -> Self {
+        Self { stages: STAGES.map(|(seconds, stride)| (bench.smoothed(seconds), stride)).into() }
+    }
+
+    /// Whether a law is to be approached.
+    #[must_use]
+    pub fn suits(law: &Law) -> bool {
+        law.cause == Cause::Backlash
+    }
+
+    /// The law at these starts on the sums, for [`Approach::from`].
+    #[must_use]
+    pub fn starts(&self, law: &'static Law, shapes: Vec<Vec<f64>>) -> Vec<Part> {
+        self.stages.first().map_or_else(Vec::new, |(bench, _)| bench.parts(law, shapes))
+    }
+
+    /// Non-linear parameters that the best start beside a set leads to; `None` where none shows anything.
+    #[must_use]
+    pub fn from(&self, starts: &[Part], set: &Fit) -> Option<Vec<f64>> {
+        let ((first, stride), finer) = self.stages.split_first()?;
+        let there = first.again(set);
+        let shows = |start: &Part| figure(&first.joined(&there, start)) < there.figure() - LEAST;
+        if !starts.iter().any(shows) {
+            return None;
+        }
+        let squares = |part: &Part| {
+            let left = first.left_beside(&there, part);
+            dot(&left, &left)
+        };
+        let nearest = starts.iter().map(|part| (squares(part), part)).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let mut part = first.approached(&there, nearest.1.clone(), *stride, MOVES);
+        for (bench, stride) in finer {
+            let start = bench.parts(part.law, vec![part.shape]).pop()?;
+            part = bench.approached(&bench.again(set), start, *stride, MOVES);
+        }
+        Some(part.shape)
+    }
+}

@@ -1,0 +1,118 @@
+//! How a model changes with the non-linear parameters of its parts, by central differences, each in the step of its scale.
+
+use super::{Bench, Fit, Part};
+use crate::diagnosis::causes::Scale;
+
+/// The derivative of the model by one non-linear parameter.
+#[derive(Debug, Clone)]
+pub struct Slope {
+    /// Index of the part.
+    pub part: usize,
+    /// Index of the parameter.
+    pub index: usize,
+    /// The derivative, stacked and scaled.
+    pub column: Vec<f64>,
+}
+
+/// A part to either side of where it stands in one parameter.
+pub(super) struct Side {
+    pub(super) index: usize,
+    /// How far apart, in the units of the scale.
+    pub(super) apart: f64,
+    pub(super) up: Part,
+    pub(super) down: Part,
+}
+
+impl Bench<'_, '_> {
+    /// How the model's sum changes with each non-linear parameter (in the units of its scale).
+    #[must_use]
+    pub fn slopes(&self, fit: &Fit, first: usize) -> Vec<Slope> {
+        let parts = fit.parts.iter().enumerate().skip(first);
+        parts
+            .flat_map(|(i, part)| {
+                self.sides(part, 1.0).into_iter().filter_map(move |side| self.slope(i, &fit.coefficients[i], &side))
+            })
+            .collect()
+    }
+
+    /// A part with each of its parameters up and down by so many steps, all worked out together.
+    pub(super) fn sides(&self, part: &Part, steps: f64) -> Vec<Side> {
+        let mut shapes = Vec::new();
+        let mut moves = Vec::new();
+        for (index, scale) in part.law.scales.iter().enumerate() {
+            let step = match *scale {
+                Scale::Choice => continue,
+                Scale::Log(..) => 0.02 * steps,
+                Scale::Linear(_, _, step) => step * steps,
+            };
+            let at = part.shape[index];
+            let (above, below) = (scale.moved(at, step), scale.moved(at, -step));
+            for value in [above, below] {
+                let mut shape = part.shape.clone();
+                shape[index] = value;
+                shapes.push(shape);
+            }
+            moves.push((index, scale.distance(below, above)));
+        }
+        let mut parts = self.parts(part.law, shapes).into_iter();
+        let side = |(index, apart): (usize, f64)| Some(Side { index, apart, up: parts.next()?, down: parts.next()? });
+        moves.into_iter().map_while(side).collect()
+    }
+
+    /// The slope between two sides of part `i`; `None` where the bounds leave no room.
+    pub(super) fn slope(
+        &self,
+        i: usize,
+        coefficients: &[f64],
+        Side { index, apart, up, down }: &Side,
+    ) -> Option<Slope> {
+        if *apart <= 0.0 {
+            return None;
+        }
+        let per = 1.0 / apart;
+        let mut column = vec![0.0; self.measured.len()];
+        let mut add = |values: &[f64], factor: f64| {
+            column.iter_mut().zip(values).for_each(|(c, v)| *c += factor * v);
+        };
+        if let (Some(up), Some(down)) = (&up.fixed, &down.fixed) {
+            add(up, per);
+            add(down, -per);
+        }
+        for ((up, down), c) in up.columns.iter().zip(down.columns.iter()).zip(coefficients) {
+            add(up, c * per);
+            add(down, -c * per);
+        }
+        Some(Slope { part: i, index: *index, column })
+    }
+}
+
+impl Scale {
+    /// The value moved by a step, within bounds.
+    #[must_use]
+    pub fn moved(self, at: f64, step: f64) -> f64 {
+        match self {
+            Scale::Choice => at,
+            // More than a doubling at once is no small step.
+            Scale::Log(low, high) => (at * step.clamp(-0.7, 0.7).exp()).clamp(low, high),
+            Scale::Linear(low, high, unit) => (at + step.clamp(-40.0 * unit, 40.0 * unit)).clamp(low, high),
+        }
+    }
+
+    fn distance(self, from: f64, to: f64) -> f64 {
+        match self {
+            Scale::Choice => 0.0,
+            Scale::Log(..) => (to / from).ln(),
+            Scale::Linear(..) => to - from,
+        }
+    }
+
+    /// Change of the value for a small step in the scale's own unit.
+    #[must_use]
+    pub fn rate(self, at: f64) -> f64 {
+        match self {
+            Scale::Choice => 0.0,
+            Scale::Log(..) => at,
+            Scale::Linear(..) => 1.0,
+        }
+    }
+}
