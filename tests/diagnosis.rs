@@ -115,6 +115,17 @@ fn what_fits_nothing_is_called_unknown() {
 }
 
 #[test]
+fn what_the_hold_out_contradicts_is_not_named() {
+    let (more, as_believed) = (recording(|_, _, v, _| 0.3 * v.signum()), recording(|_, _, _, _| 0.0));
+    let with = |holdout: &Recording| diagnose(&axis(), &more, Some(holdout), &|_, _| true).unwrap();
+    assert_eq!(with(&more).verdict, Verdict::Explained);
+    let d = with(&as_believed);
+    assert_eq!((d.verdict, d.findings.len(), d.extended), (Verdict::UnknownCause, 0, axis()));
+    let said = |note: &String| note.contains("coulomb_friction_mismatch") && note.contains("hold-out");
+    assert!(d.notes.iter().any(said), "{:?}", d.notes);
+}
+
+#[test]
 fn too_little_data_is_said_with_what_is_missing() {
     let whole = recording(|_, _, _, _| 0.0);
     let cut = |rows: std::ops::Range<usize>| {

@@ -1,6 +1,7 @@
 //! Takes an axis's columns out of a recording: converted to the drive's units, in stretches of whole, equidistant rows.
 
 use super::frame::Columns;
+use crate::analysis::statistics;
 use crate::machine::Axis;
 use crate::plant::observed::Observed;
 use crate::recording::{Column, Recording, RecordingError, Signal, Unit};
@@ -66,6 +67,7 @@ impl Columns {
             command: command.as_ref().map(|_| Vec::with_capacity(judged)),
             table: table.as_ref().map(|_| Vec::with_capacity(judged)),
             stretches: Vec::new(),
+            torque_step: 0.0,
             period_s,
             recorded_period_s: period_s,
             left_out: rows - judged,
@@ -95,6 +97,7 @@ impl Columns {
             }
             out.stretches.push(start..out.time_s.len());
         }
+        out.torque_step = undithered_step(&out.torque);
         Ok(out)
     }
 
@@ -166,6 +169,14 @@ fn spread(runs: Vec<Range<usize>>) -> Vec<Range<usize>> {
     out
 }
 
+/// The grid of a column whose noise does not carry it over its steps; 0 where it does, or there is no grid.
+fn undithered_step(values: &[f64]) -> f64 {
+    let grid = statistics::grid(values).unwrap_or(0.0);
+    let noise = statistics::white_noise(values).unwrap_or(0.0);
+    // A mean of many readings is off by a hundredth of the step at most from noise of half a step on.
+    if noise < 0.5 * grid { grid } else { 0.0 }
+}
+
 fn even_times(times: &[f64], period_s: f64) -> Vec<f64> {
     let (Some(first), Some(last)) = (times.first(), times.last()) else { return Vec::new() };
     let count = ((last - first) / period_s).floor() as usize + 1;
@@ -199,6 +210,19 @@ mod tests {
     }
 
     #[test]
+    fn a_grid_counts_where_no_noise_carries_the_torque_over_it() {
+        // As printed: six decimals of a step that has more; slow, so that most rows stand on one step.
+        let with_noise = |size: f64| -> Vec<f64> {
+            let hashed = |i: usize| ((i * 7919 + 13) * i % 10_007) as f64 / 10_007.0 - 0.5;
+            let torque = |i: usize| 3.0 * (i as f64 * 1e-3).sin() + size * hashed(i);
+            (0..20_000).map(|i| ((torque(i) * 12.0).round() / 12.0 * 1e6).round() / 1e6).collect()
+        };
+        let step = undithered_step(&with_noise(0.0));
+        assert!((step * 12.0 - 1.0).abs() < 1e-3, "{step}");
+        assert_eq!(undithered_step(&with_noise(0.3)), 0.0);
+    }
+
+    #[test]
     fn fast_rows_are_averaged_in_time_and_value_alike() {
         let rows: Vec<f64> = (0..1003).map(f64::from).collect();
         let columns = Columns {
@@ -208,6 +232,7 @@ mod tests {
             command: None,
             table: None,
             stretches: vec![0..402, 402..1003],
+            torque_step: 0.0,
             period_s: 2.5e-4,
             recorded_period_s: 2.5e-4,
             left_out: 0,

@@ -281,6 +281,12 @@ impl Fit {
         channel_squares(&self.residual, self.rows)
     }
 
+    /// Whether it leaves less than half of what another set leaves of a channel, in amplitude.
+    #[must_use]
+    pub fn halves(&self, other: &Fit) -> bool {
+        other.channels().iter().zip(self.channels()).any(|(other, own)| *other > 4.0 * own)
+    }
+
     /// The figure by which sets of causes are compared: Σ ln of the mean square of each channel.
     #[must_use]
     pub fn figure(&self) -> f64 {

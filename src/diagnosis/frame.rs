@@ -30,6 +30,8 @@ pub struct Columns {
     pub table: Option<Vec<f64>>,
     /// Stretches of whole rows without gaps.
     pub stretches: Vec<Range<usize>>,
+    /// The torque's grid where its noise does not carry it over the steps, so that a mean of rows is no finer than one; else 0.
+    pub torque_step: f64,
     /// Row period, s.
     pub period_s: f64,
     /// Period of the rows as recorded, s.
@@ -111,7 +113,7 @@ impl<'a> Frame<'a> {
         let scatter = crate::analysis::statistics::white_noise(&columns.position).unwrap_or(0.0);
         let position_noise = (grid / 12f64.sqrt()).max(scatter);
         // Torque on a coarse grid may stand still for most rows, and seems to have no noise at all.
-        let torque_grid = crate::analysis::statistics::grid(&columns.torque).unwrap_or(0.0);
+        let torque_grid = crate::analysis::statistics::grid(&columns.torque).unwrap_or(0.0).max(columns.torque_step);
         let scatter_of_torque = crate::analysis::statistics::white_noise(&columns.torque).unwrap_or(0.0);
         let torque_noise = scatter_of_torque.max(torque_grid / 12f64.sqrt());
         let low_pass = LowPass {

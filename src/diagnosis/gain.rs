@@ -51,7 +51,8 @@ pub fn on_holdout(axis: &Axis, extended: &Axis, observed: &Observed, watch: &Wat
     Ok(gains(axis, before, after))
 }
 
-/// The gains on the fitted recording itself: half of its blocks are predicted by a machine that was fitted to the others.
+/// What one set of causes gains over another on the fitted recording itself: half of its blocks are predicted by machines that
+/// were fitted to the others.
 ///
 /// # Errors
 /// [`Stopped`] when the watch's caller said so.
@@ -59,7 +60,7 @@ pub fn on_held_out_blocks(
     axis: &Axis,
     columns: &Columns,
     bench: &Bench,
-    fit: &Fit,
+    [less, full]: [&Fit; 2],
     watch: &Watch,
 ) -> Result<Vec<Gain>, Stopped> {
     let Some(mut observed) = columns.observed() else { return Ok(Vec::new()) };
@@ -67,15 +68,20 @@ pub fn on_held_out_blocks(
         // What the axis did in between is not at hand, so that no loop can be replayed.
         observed.command = None;
     }
-    let machines = [axis.clone(), fitted_without(axis, bench, fit, 0), fitted_without(axis, bench, fit, 1)];
-    let all = watch.each(&machines, (0.92, 0.99), "measuring the gain", |axis| errors(axis, &observed))?;
-    let [Some(before), Some(even), Some(odd)] = all.as_slice() else { return Ok(Vec::new()) };
     let half = half_of_rows(bench, &observed.time_s);
-    let after: Errors = std::array::from_fn(|channel| {
-        let (even, odd) = (even[channel].as_ref()?, odd[channel].as_ref()?);
-        Some(half.iter().enumerate().map(|(i, half)| [even[i], odd[i], f64::NAN][*half]).collect())
-    });
-    Ok(gains(axis, before, &after))
+    let mut channels = Vec::new();
+    for fit in [less, full] {
+        // Without a cause both halves are the belief.
+        let halves = if fit.parts.is_empty() { 0..1 } else { 0..2 };
+        let machines: Vec<Axis> = halves.map(|half| fitted_without(axis, bench, fit, half)).collect();
+        let of_half = watch.each(&machines, (0.92, 0.99), "measuring the gain", |axis| errors(axis, &observed))?;
+        let (Some(Some(even)), Some(Some(odd))) = (of_half.first(), of_half.last()) else { return Ok(Vec::new()) };
+        channels.push(std::array::from_fn(|channel| {
+            let (even, odd) = (even[channel].as_ref()?, odd[channel].as_ref()?);
+            Some(half.iter().enumerate().map(|(i, half)| [even[i], odd[i], f64::NAN][*half]).collect())
+        }));
+    }
+    Ok(gains(axis, &channels[0], &channels[1]))
 }
 
 /// The axis with effects whose coefficients are fitted without the blocks of one half.

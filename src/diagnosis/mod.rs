@@ -2,8 +2,8 @@
 //!
 //! A recording is turned into one system of equations (`frame`: motion, direction, judged rows; `filter`: the low-pass that
 //! both sides go through). `causes` holds one law a cause; `fit` solves for a set of them, `select` finds the set,
-//! `uncertainty` says how sure its parameters are, `verdict` whether anything is to be named at all, `gain` what the
-//! extended machine is worth on rows it was not fitted to.
+//! `uncertainty` says how sure its parameters are, `gain` what the extended machine is worth on rows it was not fitted to,
+//! `judge` whether anything is to be named at all, and `verdict` the whole answer.
 //!
 //! T_measured(t + delay) = J·α + Tv·ω + Tc·sign(ω) + T0 + Σ causes, in the drive's own unit (N·m, or N for linear).
 
@@ -19,6 +19,7 @@ pub mod fit;
 pub mod frame;
 pub mod gain;
 mod json;
+mod judge;
 mod known;
 pub mod progress;
 pub mod sampling;

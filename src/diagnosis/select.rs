@@ -46,9 +46,6 @@ const LEAST_SHARE: f64 = 0.001;
 /// Least size of a cause in its standard deviations: it must be known to be there at all.
 const LEAST_STRENGTH: f64 = 2.5;
 
-/// Mean square of a channel without a cause over that with it, above which the cause is there: twice in amplitude.
-const EVIDENT: f64 = 4.0;
-
 /// The set of causes that explains the recording best, and the runners-up for its first cause.
 #[derive(Debug)]
 pub struct Selection {
@@ -66,15 +63,40 @@ const BELIEF: [Cause; 4] =
 type Shelf = HashMap<Cause, Vec<Part>>;
 
 /// What stays the same while sets of causes grow.
-struct Search<'s, 'f, 'a> {
+pub struct Search<'s, 'f, 'a> {
     bench: &'s Bench<'f, 'a>,
-    approach: &'s Approach<'f, 'a>,
+    approach: Approach<'f, 'a>,
     laws: &'s [&'static Law],
     shelf: Shelf,
     watch: &'s Watch<'s>,
 }
 
-impl Search<'_, '_, '_> {
+impl<'s, 'f, 'a> Search<'s, 'f, 'a> {
+    /// A search among these laws on a bench.
+    ///
+    /// # Errors
+    /// [`Stopped`] when the watch's caller said so.
+    pub fn new(bench: &'s Bench<'f, 'a>, laws: &'s [&'static Law], watch: &'s Watch<'s>) -> Result<Self, Stopped> {
+        let approach = Approach::new(bench);
+        Ok(Self { bench, laws, shelf: shelf(bench, &approach, laws, watch)?, approach, watch })
+    }
+
+    /// The causes that explain most beside the belief as it is.
+    ///
+    /// # Errors
+    /// [`Stopped`] when the watch's caller said so.
+    pub fn from_belief(&self) -> Result<Selection, Stopped> {
+        search_from(self, self.bench.fit(Vec::new()))
+    }
+
+    /// The same with every number of the belief open from the start.
+    ///
+    /// # Errors
+    /// [`Stopped`] when the watch's caller said so.
+    pub fn from_open_belief(&self) -> Result<Selection, Stopped> {
+        search_from(self, self.with_beliefs(&self.bench.fit(Vec::new())))
+    }
+
     /// A set with every number of the belief open.
     fn with_beliefs(&self, set: &Fit) -> Fit {
         let missing = self.laws.iter().filter(|law| BELIEF.contains(&law.cause) && may_join(set, law));
@@ -82,27 +104,6 @@ impl Search<'_, '_, '_> {
         parts.extend(missing.flat_map(|law| self.bench.parts(law, vec![Vec::new()])));
         self.bench.fit(parts)
     }
-}
-
-/// Selects causes among these laws on a bench. Where what is found does not suffice, it is looked for again with every number
-/// of the belief open: of several that are wrong together none shows the way by itself.
-///
-/// # Errors
-/// [`Stopped`] when the watch's caller said so.
-pub fn select(
-    bench: &Bench,
-    laws: &[&'static Law],
-    suffices: impl Fn(&Selection) -> bool,
-    watch: &Watch,
-) -> Result<Selection, Stopped> {
-    let approach = Approach::new(bench);
-    let search = Search { bench, approach: &approach, laws, shelf: shelf(bench, &approach, laws, watch)?, watch };
-    let first = search_from(&search, bench.fit(Vec::new()))?;
-    if suffices(&first) {
-        return Ok(first);
-    }
-    let second = search_from(&search, search.with_beliefs(&bench.fit(Vec::new())))?;
-    Ok(if price(&second.fit) < price(&first.fit) { second } else { first })
 }
 
 fn shelf(bench: &Bench, approach: &Approach, laws: &[&'static Law], watch: &Watch) -> Result<Shelf, Stopped> {
@@ -320,9 +321,8 @@ fn slight(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
 /// The part of which least is known that it is there at all. What halves the rest of a channel is there, however little is
 /// known of its size: a law that is not quite the machine's leaves much, by which its size is uncertain.
 fn doubtful(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
-    let halves = |less: &Fit| less.channels().iter().zip(fit.channels()).any(|(less, left)| *less > EVIDENT * left);
     let strengths = uncertainty::strengths(bench, fit);
-    let open = (0..strengths.len()).filter(|&i| !halves(&without[i]));
+    let open = (0..strengths.len()).filter(|&i| !fit.halves(&without[i]));
     let weakest = open.min_by(|&a, &b| strengths[a].total_cmp(&strengths[b]))?;
     (strengths[weakest] < LEAST_STRENGTH).then_some(weakest)
 }

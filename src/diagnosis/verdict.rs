@@ -1,8 +1,6 @@
 //! What may be said: nothing wrong, these causes, something unknown, or not enough data.
 //!
-//! The noise floor is read off the residual itself (second differences, in which slow structure is gone). What lies above it
-//! is the excess. Causes are named only when together they remove most of the excess; a set of causes that leaves much of
-//! it is an imitation of something that is not in the vocabulary, and is not named.
+//! `judge` decides what is to be named; here the answer is put together.
 
 use super::belief;
 use super::causes::{LAWS, Law, law};
@@ -10,9 +8,10 @@ use super::experiment;
 use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
 use super::gain::{self, Gain};
+use super::judge::{Excess, Judge, Judged, refutation, refuted, rms};
 use super::known;
 use super::progress::{Progress, Stopped, Watch};
-use super::select::{Selection, select};
+use super::select::{Search, Selection};
 use super::show::{self, View};
 use super::uncertainty;
 use crate::machine::{Axis, Cause, Effect};
@@ -21,15 +20,6 @@ use crate::recording::{Recording, RecordingError};
 /// Judged time below which nothing is said, s, and judged rows.
 const LEAST_SECONDS: f64 = 1.0;
 const LEAST_ROWS: usize = 300;
-/// Excess over the noise floor (in variance) below which a belief holds.
-const TOLERABLE_EXCESS: f64 = 0.6;
-/// Share of the excess that named causes must remove together.
-const LEAST_EXPLAINED: f64 = 0.8;
-/// The same for lost motion: rigid flanks that meet without rebound place a clearance well, but not each impact.
-const LEAST_EXPLAINED_LOST_MOTION: f64 = 0.4;
-/// Excess (in variance) that may be left for everything to count as explained.
-const LITTLE_LEFT: f64 = 0.5;
-
 /// The five answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -127,53 +117,55 @@ pub fn diagnose(
     let bench = Bench::new(&frame, &known::trace(axis, &frame));
     let empty = bench.fit(Vec::new());
     let laws: Vec<&'static Law> = LAWS.iter().copied().filter(|law| belief::may_be_found(axis, law.cause)).collect();
-    let suffices = |found: &Selection| judge(&bench, &empty, found).0 != Verdict::UnknownCause;
-    let selection = select(&bench, &laws, suffices, &watch)?;
-    let (verdict, fit) = judge(&bench, &empty, &selection);
-    let findings = findings(axis, &bench, fit, &selection, &empty);
-    let effects: Vec<Effect> = findings.iter().map(|f| f.effect).collect();
-    let extended = belief::extended(axis, &effects);
-    watch.at(0.92, "measuring the gain")?;
-    let gains = match holdout.map(|h| Columns::of(h, axis).map(|columns| (columns.note(), columns.observed()))) {
-        Some(Ok((note, Some(observed)))) => {
-            notes.extend(note);
-            gain::on_holdout(axis, &extended, &observed, &watch)?
+    let judge = Judge { axis, whole: &whole, bench: &bench, empty: &empty, watch: &watch };
+    let search = Search::new(&bench, &laws, &watch)?;
+    let mut judged = judge.judge(search.from_belief()?)?;
+    if judged.verdict == Verdict::UnknownCause {
+        // Of several numbers of the belief that are wrong together none shows the way by itself.
+        let again = judge.judge(search.from_open_belief()?)?;
+        if again.verdict != Verdict::UnknownCause {
+            judged = again;
         }
-        None => gain::on_held_out_blocks(axis, &whole, &bench, fit, &watch)?,
-        Some(why) => {
-            let why = why.err().map_or_else(|| "no stretch of it is whole".to_owned(), |e| e.to_string());
-            notes.push(format!("the hold-out cannot be used ({why}); the gain is measured on held-out blocks instead"));
-            gain::on_held_out_blocks(axis, &whole, &bench, fit, &watch)?
+    }
+    notes.extend(judged.refutation.take());
+    let mut findings = findings(axis, &bench, &judged.selection, &empty);
+    let mut extended = extended_by(axis, &findings);
+    if let Some(holdout) = holdout {
+        match Columns::of(holdout, axis).map(|columns| (columns.note(), columns.observed())) {
+            Ok((note, Some(observed))) => {
+                notes.extend(note);
+                judged.gains = gain::on_holdout(axis, &extended, &observed, &watch)?;
+                if refuted(&judged.gains) {
+                    let causes = findings.iter().map(|f| f.effect.cause());
+                    notes.push(refutation(causes, &judged.gains, "the hold-out"));
+                    judged = judge.nothing(&judged.selection)?;
+                    (findings, extended) = (Vec::new(), axis.clone());
+                    judged.gains = gain::on_holdout(axis, axis, &observed, &watch)?;
+                }
+            }
+            why => {
+                let why = why.err().map_or_else(|| "no stretch of it is whole".to_owned(), |e| e.to_string());
+                notes.push(format!(
+                    "the hold-out cannot be used ({why}); the gain is measured on held-out blocks instead"
+                ));
+            }
         }
-    };
-    let shown = show::views(&bench, &empty, fit);
-    let [rest, _] = bench.rest(fit);
+    }
+    let Judged { verdict, selection: Selection { fit, .. }, gains, .. } = judged;
+    let shown = show::views(&bench, &empty, &fit);
+    let [rest, _] = bench.rest(&fit);
     let unexplained = Unexplained {
         torque_rms: rms(&rest),
         noise_rms: frame.floor(&rest, true),
-        describes: show::describe(&shown, Excess::of(&bench, fit, fit).largest()),
+        describes: show::describe(&shown, Excess::of(&bench, &fit, &fit).largest()),
     };
     watch.at(1.0, "done")?;
     Ok(Diagnosis { verdict, findings, gains, unexplained, shown, missing: Vec::new(), notes, extended })
 }
 
-/// What may be said, and the fit that says it.
-fn judge<'f>(bench: &Bench, empty: &'f Fit, selection: &'f Selection) -> (Verdict, &'f Fit) {
-    let before = Excess::of(bench, empty, &selection.fit);
-    let after = Excess::of(bench, &selection.fit, &selection.fit);
-    let explained = before.explained_by(&after);
-    let lost_motion = selection.fit.parts.iter().any(|p| p.law.cause == Cause::Backlash);
-    let least = if lost_motion { LEAST_EXPLAINED_LOST_MOTION } else { LEAST_EXPLAINED };
-    if selection.fit.parts.is_empty() {
-        let verdict = if before.largest() > TOLERABLE_EXCESS { Verdict::UnknownCause } else { Verdict::NoDiscrepancy };
-        (verdict, empty)
-    } else if before.largest() > TOLERABLE_EXCESS && explained < least {
-        (Verdict::UnknownCause, empty)
-    } else if after.largest() > LITTLE_LEFT {
-        (Verdict::PartlyExplained, &selection.fit)
-    } else {
-        (Verdict::Explained, &selection.fit)
-    }
+fn extended_by(axis: &Axis, findings: &[Finding]) -> Axis {
+    let effects: Vec<Effect> = findings.iter().map(|f| f.effect).collect();
+    belief::extended(axis, &effects)
 }
 
 /// Whether a recording has the columns that a diagnosis of this axis needs.
@@ -214,39 +206,8 @@ fn what_is_missing(frame: &Frame) -> Vec<String> {
     missing
 }
 
-/// Variance above the noise floor, a channel each, in units of the floor's variance.
-struct Excess {
-    channels: Vec<f64>,
-}
-
-impl Excess {
-    /// The excess of a fit; the floor is that of the best fit.
-    fn of(bench: &Bench, fit: &Fit, best: &Fit) -> Excess {
-        let (rest, floor) = (bench.rest(fit), bench.rest(best));
-        let channels = (0..2)
-            .filter(|&c| !rest[c].is_empty())
-            .map(|c| (rms(&rest[c]) / bench.frame.floor(&floor[c], c == 0)).powi(2) - 1.0)
-            .collect();
-        Excess { channels }
-    }
-
-    fn largest(&self) -> f64 {
-        self.channels.iter().copied().fold(0.0, f64::max)
-    }
-
-    /// Share of this excess that is gone in the other, over the channels that had any.
-    fn explained_by(&self, after: &Excess) -> f64 {
-        let pairs = self.channels.iter().zip(&after.channels).filter(|(a, _)| **a > TOLERABLE_EXCESS);
-        let (before, left) = pairs.fold((0.0, 0.0), |(b, l), (x, y)| (b + x, l + y.max(0.0)));
-        if before > 0.0 { 1.0 - left / before } else { 1.0 }
-    }
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
-}
-
-fn findings(axis: &Axis, bench: &Bench, fit: &Fit, selection: &Selection, empty: &Fit) -> Vec<Finding> {
+fn findings(axis: &Axis, bench: &Bench, selection: &Selection, empty: &Fit) -> Vec<Finding> {
+    let fit = &selection.fit;
     let mut effects = uncertainty::effects(bench, fit);
     belief::reconcile(bench.frame.axis, effects.iter_mut().flatten().map(|(effect, _)| effect));
     let total = 1.0 - (fit.squares() / empty.squares()).min(1.0);
@@ -262,7 +223,7 @@ fn findings(axis: &Axis, bench: &Bench, fit: &Fit, selection: &Selection, empty:
     for (i, found) in effects.into_iter().enumerate() {
         let Some((effect, deviations)) = found else { continue };
         let law: &Law = law(effect.cause());
-        let ties = ties(bench, fit, selection, i);
+        let ties = ties(bench, selection, i);
         list.push(Finding {
             evidence: (law.sentence)(&belief::together(axis, effect), bench.frame.axis),
             confidence: confidence(bench, fit, i),
@@ -307,7 +268,8 @@ fn block_t(bench: &Bench, less: &Fit, full: &Fit) -> f64 {
 }
 
 /// Causes that take the place of a part without a difference that the blocks bear out.
-fn ties(bench: &Bench, fit: &Fit, selection: &Selection, part: usize) -> Vec<Cause> {
+fn ties(bench: &Bench, selection: &Selection, part: usize) -> Vec<Cause> {
+    let fit = &selection.fit;
     let own = fit.parts[part].law.cause;
     let others: Vec<Cause> = fit.parts.iter().map(|p| p.law.cause).collect();
     let mut list = Vec::new();

@@ -10,7 +10,12 @@ pub static LAW: Law = Law {
     starts_from_rest: false,
     simulated: false,
     terms: |frame, shapes| each(shapes, |_| Term::torque(frame.speed.clone())),
-    effect: |frame, _, c| Some(Effect::ViscousFrictionMismatch { slope: frame.belief.viscous + c.first()? }),
+    effect: |frame, _, c| {
+        let change = *c.first()?;
+        let slope = frame.belief.viscous + change;
+        // None at all may be found a little below it; friction that falls with speed is another law.
+        (slope >= -0.02 * change.abs()).then_some(Effect::ViscousFrictionMismatch { slope: slope.max(0.0) })
+    },
     confused_with: &[Cause::QuadraticDrag, Cause::DirectionDependentFriction],
     sentence: |effect, axis| match effect {
         Effect::ViscousFrictionMismatch { slope } => format!(

@@ -1,0 +1,179 @@
+//! Whether a set of causes is to be named.
+//!
+//! The noise floor is read off the residual itself (second differences, in which slow structure is gone). What lies above it
+//! is the excess. Causes are named only when together they remove most of the excess; a set of causes that leaves much of
+//! it is an imitation of something that is not in the vocabulary, and is not named. Nor is one whose machine predicts rows
+//! that were held out worse than the belief: laws that lean on each other, or on the noise of the encoder that they are
+//! driven by, may explain what was measured and yet make a wrong machine.
+
+use super::fit::{Bench, Fit};
+use super::frame::Columns;
+use super::gain::{self, Gain};
+use super::progress::{Stopped, Watch};
+use super::select::Selection;
+use super::verdict::Verdict;
+use crate::machine::{Axis, Cause};
+
+/// Excess over the noise floor (in variance) below which a belief holds.
+const TOLERABLE_EXCESS: f64 = 0.6;
+/// Share of the excess that named causes must remove together.
+const LEAST_EXPLAINED: f64 = 0.8;
+/// The same for lost motion: rigid flanks that meet without rebound place a clearance well, but not each impact.
+const LEAST_EXPLAINED_LOST_MOTION: f64 = 0.4;
+/// Excess (in variance) that may be left for everything to count as explained.
+const LITTLE_LEFT: f64 = 0.5;
+
+/// What stays the same while sets of causes are judged.
+pub struct Judge<'j, 'f, 'a> {
+    /// The belief.
+    pub axis: &'j Axis,
+    /// The recording, every row.
+    pub whole: &'j Columns,
+    /// The system of equations.
+    pub bench: &'j Bench<'f, 'a>,
+    /// The fit without a cause.
+    pub empty: &'j Fit,
+    /// Told how far it is.
+    pub watch: &'j Watch<'j>,
+}
+
+/// What may be said.
+#[derive(Debug)]
+pub struct Judged {
+    /// In a word.
+    pub verdict: Verdict,
+    /// The causes that are named: none where the verdict names none.
+    pub selection: Selection,
+    /// What they are worth on held-out blocks.
+    pub gains: Vec<Gain>,
+    /// What explains the recording and is not named all the same.
+    pub refutation: Option<String>,
+}
+
+impl Judge<'_, '_, '_> {
+    /// Judges a set of causes.
+    ///
+    /// # Errors
+    /// [`Stopped`] when the watch's caller said so.
+    pub fn judge(&self, selection: Selection) -> Result<Judged, Stopped> {
+        let selection = self.without_idle_spring(selection)?;
+        let Some(verdict) = self.explains(&selection.fit) else { return self.nothing(&selection) };
+        let gains = self.gains([self.empty, &selection.fit])?;
+        if !refuted(&gains) {
+            return Ok(Judged { verdict, selection, gains, refutation: None });
+        }
+        let causes = selection.fit.parts.iter().map(|p| p.law.cause);
+        let refutation = refutation(causes, &gains, "rows that it was not fitted to");
+        Ok(Judged { refutation: Some(refutation), ..self.nothing(&selection)? })
+    }
+
+    /// Leaves out what is simulated behind the measured motion (a spring, a clearance) where the machine with it is known to be
+    /// worse, or not known to be better in any channel: it may gain by taking off what the encoder's noise makes, and such a
+    /// gain is none of the machine's. Half of a channel's rest is never noise of the encoder alone.
+    fn without_idle_spring(&self, mut found: Selection) -> Result<Selection, Stopped> {
+        let Some(simulated) = found.fit.parts.iter().position(|p| p.law.simulated) else { return Ok(found) };
+        let mut parts = found.fit.parts.clone();
+        parts.remove(simulated);
+        let less = self.bench.refine(self.bench.fit(parts), 0, 4);
+        if !found.fit.halves(&less) {
+            let gains = self.gains([&less, &found.fit])?;
+            let no_better = !gains.is_empty() && gains.iter().all(|gain| gain.ci95[0] <= 1.0);
+            if no_better || refuted(&gains) {
+                found.fit = less;
+            }
+        }
+        Ok(found)
+    }
+
+    fn gains(&self, sets: [&Fit; 2]) -> Result<Vec<Gain>, Stopped> {
+        gain::on_held_out_blocks(self.axis, self.whole, self.bench, sets, self.watch)
+    }
+
+    /// What is to be said when none of the causes that were found is to be named.
+    ///
+    /// # Errors
+    /// [`Stopped`] when the watch's caller said so.
+    pub fn nothing(&self, found: &Selection) -> Result<Judged, Stopped> {
+        let before = Excess::of(self.bench, self.empty, &found.fit);
+        let unknown = before.largest() > TOLERABLE_EXCESS;
+        Ok(Judged {
+            verdict: if unknown { Verdict::UnknownCause } else { Verdict::NoDiscrepancy },
+            selection: Selection { fit: self.empty.clone(), rivals: Vec::new() },
+            gains: self.gains([self.empty; 2])?,
+            refutation: None,
+        })
+    }
+
+    /// How well a set of causes explains the excess; `None` where it does not, or there is no cause.
+    fn explains(&self, fit: &Fit) -> Option<Verdict> {
+        let before = Excess::of(self.bench, self.empty, fit);
+        let after = Excess::of(self.bench, fit, fit);
+        let lost_motion = fit.parts.iter().any(|p| p.law.cause == Cause::Backlash);
+        let least = if lost_motion { LEAST_EXPLAINED_LOST_MOTION } else { LEAST_EXPLAINED };
+        let too_little = before.largest() > TOLERABLE_EXCESS && before.explained_by(&after) < least;
+        if fit.parts.is_empty() || too_little {
+            None
+        } else if after.largest() > LITTLE_LEFT {
+            Some(Verdict::PartlyExplained)
+        } else {
+            Some(Verdict::Explained)
+        }
+    }
+}
+
+/// Whether a machine is known to be worse than the belief: surely so in torque or motor position, and in both together. The
+/// simulated table carries the motor's error along, with which what the table does may happen to go.
+#[must_use]
+pub fn refuted(gains: &[Gain]) -> bool {
+    let motor = || gains.iter().filter(|gain| gain.channel != "table_position");
+    motor().any(|gain| gain.ci95[1] < 1.0) && motor().map(|gain| (gain.before / gain.after).ln()).sum::<f64>() < 0.0
+}
+
+/// Says what causes are refuted, and by which rows.
+#[must_use]
+pub fn refutation(causes: impl Iterator<Item = Cause>, gains: &[Gain], rows: &str) -> String {
+    let causes: Vec<&str> = causes.map(Cause::name).collect();
+    let ratios: Vec<String> = gains.iter().map(|g| format!("{} {:.2}", g.channel, g.before / g.after)).collect();
+    format!(
+        "{} would explain the recording, but predicts {rows} worse than the belief does (error before over after: {}): it imitates something else and is not named",
+        causes.join(" with "),
+        ratios.join(", ")
+    )
+}
+
+/// Variance above the noise floor, a channel each, in units of the floor's variance.
+pub struct Excess {
+    channels: Vec<f64>,
+}
+
+impl Excess {
+    /// The excess of a fit; the floor is that of the best fit.
+    #[must_use]
+    pub fn of(bench: &Bench, fit: &Fit, best: &Fit) -> Excess {
+        let (rest, floor) = (bench.rest(fit), bench.rest(best));
+        let channels = (0..2)
+            .filter(|&c| !rest[c].is_empty())
+            .map(|c| (rms(&rest[c]) / bench.frame.floor(&floor[c], c == 0)).powi(2) - 1.0)
+            .collect();
+        Excess { channels }
+    }
+
+    /// Of the worse channel.
+    #[must_use]
+    pub fn largest(&self) -> f64 {
+        self.channels.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Share of this excess that is gone in the other, over the channels that had any.
+    fn explained_by(&self, after: &Excess) -> f64 {
+        let pairs = self.channels.iter().zip(&after.channels).filter(|(a, _)| **a > TOLERABLE_EXCESS);
+        let (before, left) = pairs.fold((0.0, 0.0), |(b, l), (x, y)| (b + x, l + y.max(0.0)));
+        if before > 0.0 { 1.0 - left / before } else { 1.0 }
+    }
+}
+
+/// Root of the mean square; 0 of nothing.
+#[must_use]
+pub fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
