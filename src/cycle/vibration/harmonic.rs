@@ -6,8 +6,8 @@
 //!
 //! (Widrow's adaptive noise canceller, 1975; each harmonic is a notch of width µ.) µ is the part of a revolution that a
 //! cycle turns, over the revolutions averaged, so it is the spindle's angle that counts and not time. White noise of
-//! variance σ² leaves µσ² in each coefficient. When the speed changes the coefficients of an acceleration grow with its
-//! fourth power, as what inertia forces do: force ∝ Ω², displacement ∝ Ω², acceleration ∝ Ω⁴.
+//! variance σ² leaves µσ² in each coefficient. The coefficients stand for one speed: where the spindle turns by another, what they
+//! say grows as inertia forces do: force ∝ Ω², displacement ∝ Ω² = g, acceleration ∝ Ω⁴ = g².
 
 use super::spindle::Wheel;
 use crate::cycle::lanes::{Lanes, flushed, sums};
@@ -141,16 +141,18 @@ impl Trackers {
         self.bounds = Lanes::new([a, b, c, d]);
     }
 
-    /// What the harmonics leave of two readings, then what two others say at the wheel's angle, with their signs turned.
+    /// What the harmonics leave of two readings, then what two others say at the wheel's angle, with their signs turned; the
+    /// others have grown by `growth`, these by its square.
     #[inline(always)]
     #[must_use]
-    pub fn left(&self, wheel: &Wheel, pairs: usize, readings: [f64; 2], others: &[Harmonics; 2]) -> Lanes {
+    pub fn left(&self, wheel: &Wheel, pairs: usize, readings: [f64; 2], others: &[Harmonics; 2], growth: f32) -> Lanes {
         let [a, b] = &self.harmonics;
         let [c, d] = others;
         let (first, second) = (readings[0] - self.offset[0], readings[1] - self.offset[1]);
         let others = [c.parts(wheel, pairs), d.parts(wheel, pairs)];
         let known = sums([a.parts(wheel, pairs), b.parts(wheel, pairs)], others);
-        Lanes::new([first as f32, second as f32, 0.0, 0.0]) - known
+        let square = growth * growth;
+        Lanes::new([first as f32, second as f32, 0.0, 0.0]) - known * Lanes::new([square, square, growth, growth])
     }
 
     /// Deviations with those beyond belief cut down, after `turned` turns.
@@ -168,15 +170,16 @@ impl Trackers {
         Lanes::new(believed)
     }
 
-    /// Takes up what was left: `share` is µ, `turning` the part of a turn that each harmonic takes its own share of.
+    /// Takes up what was left: `share` is µ, `turning` the part of a turn that each harmonic takes its own share of, over the
+    /// square of its `growth`.
     #[inline(always)]
-    pub fn learn(&mut self, wheel: &Wheel, pairs: usize, left: Lanes, [share, turning]: [f32; 2]) {
+    pub fn learn(&mut self, wheel: &Wheel, pairs: usize, left: Lanes, [share, turning]: [f32; 2], growth: f32) {
         let shares = Lanes::new([share, share, 0.0, 0.0]);
         self.bounds += shares * (left * left * Lanes::splat(CLIP * CLIP) - self.bounds);
         let [a, b, ..] = (shares * left).to_array();
         self.offset[0] += f64::from(a);
         self.offset[1] += f64::from(b);
-        let [a, b, ..] = (Lanes::splat(turning + turning) * left).to_array();
+        let [a, b, ..] = (Lanes::splat((turning + turning) / (growth * growth)) * left).to_array();
         for (n, step) in [a, b].into_iter().enumerate() {
             self.harmonics[n].learn(wheel, pairs, step, &self.shares[n]);
         }
@@ -189,8 +192,7 @@ impl Trackers {
     }
 }
 
-/// Makes harmonics larger by a factor, as a change of speed does.
-#[inline(always)]
+/// Makes harmonics larger by a factor, for good.
 pub fn grow(harmonics: &mut [Harmonics; 2], pairs: usize, factor: f32) {
     for one in harmonics {
         one.0.iter_mut().take(pairs).for_each(|pair| *pair *= Lanes::splat(factor));

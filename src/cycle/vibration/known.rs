@@ -18,6 +18,9 @@ const NOISE_MARGIN: f32 = 1.5;
 /// Power above which a harmonic that has just come is believed at once, in powers of its noise.
 const SUDDEN: f32 = 10.0;
 
+/// Largest share of a revolution's news: with more, what changes at one harmonic is seen at all others.
+const MOST: f32 = 1.5;
+
 /// Powers and averages below this are none, long before they could be subnormal.
 const FLUSH: f32 = 1e-10;
 
@@ -33,13 +36,30 @@ pub struct Known {
 }
 
 impl Known {
+    /// Makes the displacement larger by a factor, for good.
+    pub fn grow(&mut self, growth: f32) {
+        let factor = Lanes::splat(growth);
+        self.slow *= factor;
+        self.now *= factor;
+        self.power *= factor * factor;
+    }
+
+    /// Mean square of the displacement at both harmonics.
+    #[inline(always)]
+    #[must_use]
+    pub fn strength(&self) -> f32 {
+        let [a, _, b, _] = self.power.to_array();
+        a + b
+    }
+
     /// Takes up a displacement that averaged `news` of itself since the last time, and puts it ahead of its lag: what lags
-    /// behind a ramp by one average lags by two after another (Brown's double smoothing). `ahead`: 0 to 1.
+    /// behind a ramp by one average lags by two after another (Brown's double smoothing). `ahead`: up to 1, which is all of it.
     #[inline(always)]
     pub fn look(&mut self, now: Lanes, news: Lanes, ahead: Lanes) {
         let news = news.fast_min(Lanes::ONE);
-        self.slow = flushed(self.slow + news * (now - self.slow), FLUSH);
-        self.now = now + ahead.fast_max(Lanes::ZERO) * (now - self.slow);
+        let lag = now - self.slow;
+        self.slow = flushed(self.slow + news * lag, FLUSH);
+        self.now = now + ahead.fast_max(Lanes::ZERO).fast_min(Lanes::ONE) * lag;
         let square = paired(self.now * self.now);
         self.power = flushed(self.power + Lanes::splat(0.5) * news * (square - self.power), FLUSH);
     }
@@ -56,12 +76,12 @@ impl Known {
         left / self.power.fast_max(Lanes::splat(1e-30)) * self.now
     }
 
-    /// Share of a revolution's news to let in from now on, `least` to 1.
+    /// Share of a revolution's news to let in from now on, from `least` on.
     #[inline(always)]
     #[must_use]
     pub fn share(&self, drift: f32, noise: Lanes, least: f32) -> Lanes {
         // N below any sensor's keeps the quotient finite.
         let best = Lanes::splat(drift) * (self.power / (noise + Lanes::splat(1e-12))).sqrt();
-        best.fast_max(Lanes::splat(least)).fast_min(Lanes::ONE)
+        best.fast_max(Lanes::splat(least)).fast_min(Lanes::splat(MOST))
     }
 }

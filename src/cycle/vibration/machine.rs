@@ -62,6 +62,8 @@ pub struct Vibration {
     part: f32,
     /// Relative change of speed in a revolution, averaged over one.
     swing: f64,
+    /// What the displacements have grown by since the harmonics stood, see [`Spindle::growth`].
+    growth: f32,
     degraded: u64,
     seen: u32,
     spindle: Spindle,
@@ -72,7 +74,7 @@ pub struct Vibration {
     slide: Trackers,
     /// What is known of each pair of harmonics of seat and bearing beside its value.
     known: [[Known; PAIRS]; 2],
-    /// Displacement of seat and bearing, µm.
+    /// Displacement of seat and bearing, µm, for the speed for which the harmonics stand.
     displacement: [Harmonics; 2],
     integrators: [Integrator; 2],
     /// Last good displacement by integration, µm: what fades out.
@@ -93,6 +95,7 @@ impl Default for Vibration {
             renewal: Renewal::default(),
             part: 0.0,
             swing: 0.0,
+            growth: 1.0,
             degraded: 0,
             seen: 0,
             spindle: Spindle::default(),
@@ -225,14 +228,13 @@ impl Vibration {
             self.learn::<N>(input, &wheel);
             self.renew_pair();
         } else {
-            // What does not learn has nothing that could grow with the speed; what fades out is what was known.
-            self.spindle.change(&self.plan);
+            // What does not learn does not follow the speed either: what fades out is what was known.
             if self.phase == Phase::Running && reasons == GIB_VIBRATION_NO_REVOLUTION {
                 self.learn_first::<N>(input, &wheel);
             }
         }
         let [seat, bearing] = &self.displacement;
-        [seat.value(&wheel, N).into(), bearing.value(&wheel, N).into()]
+        [(self.growth * seat.value(&wheel, N)).into(), (self.growth * bearing.value(&wheel, N)).into()]
     }
 
     /// Both accelerations and, where there is one, the second slide, with their readings.
@@ -246,6 +248,9 @@ impl Vibration {
     fn learn_first<const N: usize>(&mut self, input: &VibrationInput, wheel: &Wheel) {
         let (asked, part) = (self.plan.harmonics, self.spindle.turned.abs());
         let begins = self.progress <= part;
+        if begins {
+            self.settle();
+        }
         for (trackers, readings) in self.signals(input) {
             if begins {
                 trackers.begin(readings, asked);
@@ -259,6 +264,8 @@ impl Vibration {
     fn end_first<const N: usize>(&mut self, input: &VibrationInput, wheel: &Wheel) {
         self.revolution = f64::INFINITY;
         self.part = 1.0;
+        self.renewal.rate = self.spindle.rate;
+        self.spindle.settle(&self.plan);
         let part = 1.0 - (self.progress - self.spindle.turned.abs());
         for (trackers, readings) in self.signals(input) {
             trackers.first(wheel, N, readings, part);
@@ -268,26 +275,48 @@ impl Vibration {
 
     /// Follows the harmonics from then on.
     fn learn<const N: usize>(&mut self, input: &VibrationInput, wheel: &Wheel) {
-        let change = self.spindle.change(&self.plan);
         if self.revolution == 1.0 {
             return self.end_first::<N>(input, wheel);
         }
-        self.swing += change;
+        self.follow();
         let turning = self.turning(self.spindle.turned);
         let shares = [turning * self.part, turning];
-        let (displacement, progress) = (self.displacement, self.progress);
+        let (displacement, progress, mut growth) = (self.displacement, self.progress, self.growth);
         for (trackers, readings) in self.signals(input) {
-            let mut left = trackers.left(wheel, N, readings, &displacement);
+            let mut left = trackers.left(wheel, N, readings, &displacement, growth);
             // Until then the variance is not known.
             if progress > 3.0 {
                 left = trackers.believed(left, turning);
             }
-            trackers.learn(wheel, N, left, shares);
+            trackers.learn(wheel, N, left, shares, growth);
+            // The second slide moves by command, however fast the spindle turns.
+            growth = 1.0;
         }
-        if change != 0.0 {
-            grow(&mut self.trackers.harmonics, N, (1.0 + 4.0 * change) as f32);
-            grow(&mut self.displacement, N, (1.0 + 2.0 * change) as f32);
+    }
+
+    /// The harmonics follow the speed.
+    fn follow(&mut self) {
+        let leapt = self.spindle.leapt();
+        if leapt {
+            self.renewal.rate = self.spindle.rate;
+        } else {
+            self.growth = self.spindle.growth();
         }
+        if leapt || self.spindle.far() {
+            self.settle();
+        }
+    }
+
+    /// The harmonics say the same as before, and stand for the present speed from now on.
+    #[inline(never)]
+    fn settle(&mut self) {
+        let (growth, pairs) = (self.growth, self.plan.pairs);
+        grow(&mut self.trackers.harmonics, pairs, growth * growth);
+        grow(&mut self.displacement, pairs, growth);
+        self.known.iter_mut().flatten().for_each(|known| known.grow(growth));
+        self.renewal.grow(growth);
+        self.growth = 1.0;
+        self.spindle.settle(&self.plan);
     }
 
     /// Part of a turn that a cycle counts for: no more than the trackers can bear.
@@ -464,7 +493,7 @@ impl Vibration {
         let [seat, bearing] = &self.displacement;
         for (i, (amplitude, phase)) in report.amplitude_um.iter_mut().zip(&mut report.phase_deg).enumerate() {
             let ([a, b], [c, d]) = (seat.get(i), bearing.get(i));
-            let (x, y) = (f64::from(a - c), f64::from(b - d));
+            let (x, y) = (f64::from(self.growth * (a - c)), f64::from(self.growth * (b - d)));
             (*amplitude, *phase) = (x.hypot(y), y.atan2(x).to_degrees());
         }
         report

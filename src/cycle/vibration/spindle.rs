@@ -9,10 +9,10 @@ use crate::cycle::lanes::{Lanes, swapped};
 use crate::cycle::turns::{fold, folded};
 use wide::f64x2;
 
-/// Largest relative change of speed at once that the harmonics follow.
-const CHANGE_MAX: f64 = 0.02;
-/// Smallest: amplitudes are then within 0.2 % of what they should be, and what an encoder's grid does to the speed is none.
-const CHANGE_MIN: f64 = 1.0 / 2048.0;
+/// Largest change of speed at once that is the spindle's own, relative to the one for which the harmonics stand.
+const LEAP: f64 = 0.02;
+/// How far the speed may be from that one, relative to it: a speed varied by 10 % stays within for good.
+const BAND: f64 = 0.25;
 
 /// cos kθ and sin kθ for k = 1 to 16, two multiples in each: cos, sin, cos, sin.
 #[derive(Debug, Clone, Copy, Default)]
@@ -29,9 +29,12 @@ pub struct Spindle {
     pub rate: f64,
     /// Turns in this cycle.
     pub turned: f64,
-    /// The rate for which the harmonics stand.
+    /// How much the rate changed in this cycle.
+    change: f64,
+    /// The rate for which the harmonics stand, and its inverse.
     stand: f64,
-    /// How far it may be from the present one, and how large any position may be.
+    per_stand: f64,
+    /// How far the present one may be from it; and a cycle's turn from the rate.
     pub bounds: f64x2,
     /// Angles read so far, up to 2: the first two give the speed to start from.
     known: u32,
@@ -44,8 +47,10 @@ pub struct Turn {
     rate: f64,
     /// Turns in this cycle, without their sign.
     pub turned: f64,
-    /// How far the speed is from the one known, and the position that came along, without their signs.
+    /// How far the speed is from the one for which the harmonics stand, and this turn from the speed, without their signs.
     pub bounded: f64x2,
+    /// As [`Spindle::growth`].
+    pub growth: f32,
 }
 
 impl Spindle {
@@ -67,32 +72,62 @@ impl Spindle {
             self.lost(angle);
         }
         // Flushes what decays towards zero before it is subnormal.
-        self.rate = (self.rate + plan.speed_share * (self.turned - self.rate) + 1e-12) - 1e-12;
+        let rate = (self.rate + plan.speed_share * (self.turned - self.rate) + 1e-12) - 1e-12;
+        self.change = rate - self.rate;
+        self.rate = rate;
         good
     }
 
-    /// The rate for which the harmonics stand.
+    /// How a displacement has grown since the harmonics stood, with the square of the speed.
     #[inline(always)]
     #[must_use]
-    pub fn stand(&self) -> f64 {
-        self.stand
+    pub fn growth(&self) -> f32 {
+        let ratio = (self.rate * self.per_stand) as f32;
+        ratio * ratio
     }
 
-    /// Whether the next cycle can be a usual one: steady in speed, no turn near the largest.
+    /// Change of the speed since it was `rate`, relative to the one for which the harmonics stand.
+    #[inline(always)]
     #[must_use]
-    pub fn steady(&self, plan: &Plan) -> bool {
+    pub fn change_since(&self, rate: f64) -> f64 {
+        (self.rate - rate) * self.per_stand
+    }
+
+    /// The harmonics stand for the present speed from now on.
+    pub fn settle(&mut self, plan: &Plan) {
+        // Where it does not turn, nothing is learnt that could grow.
+        (self.stand, self.per_stand) = (self.rate, if self.rate == 0.0 { 0.0 } else { 1.0 / self.rate });
+        let stand = self.stand.abs();
+        let band = (BAND * stand).min(0.5 * (plan.turn_max - stand));
+        let leap = (LEAP * stand / plan.speed_share).min(plan.turn_max - stand - band);
+        self.bounds = f64x2::new([band, leap]);
+    }
+
+    /// Whether the speed is far from the one for which the harmonics stand.
+    #[must_use]
+    pub fn far(&self) -> bool {
         let [band, _] = self.bounds.to_array();
-        self.stand.abs() + 2.0 * band / plan.speed_share <= plan.turn_max
+        (self.rate - self.stand).abs() > band
     }
 
-    /// Reads the angle of a usual cycle. It goes on from the last at the speed known if its `bounded` is within `bounds`.
+    /// Whether it changed in this cycle as no spindle does: a glitch of its encoder, or a cycle that came late.
+    #[must_use]
+    pub fn leapt(&self) -> bool {
+        self.change.abs() > LEAP * self.stand.abs()
+    }
+
+    /// Reads the angle of a usual cycle, which it is if its `bounded` is within `bounds`: the turn is then no larger than the
+    /// largest. What is `none` is 0, or no number where something else is none.
     #[inline(always)]
     #[must_use]
-    pub fn usual(&self, plan: &Plan, angle_deg: f64, scale: f64) -> Turn {
+    pub fn usual(&self, plan: &Plan, angle_deg: f64, none: f64) -> Turn {
         let angle = folded(angle_deg * (1.0 / 360.0));
         let turned = folded(angle - self.angle);
-        let rate = self.rate + plan.speed_share * (turned - self.rate);
-        Turn { angle, rate, turned: turned.abs(), bounded: f64x2::new([rate - self.stand, scale]).abs() }
+        let ahead = turned - self.rate;
+        let rate = self.rate + plan.speed_share * ahead;
+        let ratio = (rate * self.per_stand) as f32;
+        let bounded = f64x2::new([rate - self.stand, ahead + none]).abs();
+        Turn { angle, rate, turned: turned.abs(), bounded, growth: ratio * ratio }
     }
 
     /// cos and sin of the multiples of an angle that was read.
@@ -106,19 +141,6 @@ impl Spindle {
     #[inline(always)]
     pub fn take(&mut self, turn: &Turn) {
         (self.angle, self.rate) = (turn.angle, turn.rate);
-    }
-
-    /// The harmonics stand for the present rate; returns its relative change if they are to follow that, else 0.
-    pub fn change(&mut self, plan: &Plan) -> f64 {
-        let change = self.rate - self.stand;
-        let [band, _] = self.bounds.to_array();
-        if change.abs() <= band {
-            return 0.0;
-        }
-        let relative = if self.stand.abs() > plan.rate_min { change / self.stand } else { 0.0 };
-        self.stand = self.rate;
-        self.bounds = f64x2::new([CHANGE_MIN * self.stand.abs(), f64::MAX]);
-        if relative.abs() < CHANGE_MAX { relative } else { 0.0 }
     }
 
     /// Turns on at the last speed. A jump is taken as the place from which to go on; what is no number is not.

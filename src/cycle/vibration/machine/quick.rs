@@ -7,41 +7,37 @@ use super::*;
 use crate::cycle::lanes::within;
 use wide::f64x2;
 
-/// Relative change of speed in a revolution below which the speed counts as steady.
-const SWING_MAX: f64 = 1e-3;
-
 impl Vibration {
     /// Says whether the next cycle can be a usual one.
     pub(super) fn see_usual(&mut self) {
-        let calm = self.trackers.surprise == [0.0; 2] && self.sensors.live() && self.spindle.steady(&self.plan);
+        let calm = self.trackers.surprise == [0.0; 2] && self.sensors.live();
         let known = self.revolution == f64::INFINITY && self.progress > 3.0;
-        // Else the displacements change too fast to be renewed at leisure.
-        let steady = self.swing.abs() < SWING_MAX;
         let simple = !self.plan.integrate && !self.plan.second_slide;
         let full = self.phase == Phase::Running && self.blend == 1.0;
-        self.usual = if calm && steady && known && simple && full { self.plan.pairs } else { 0 };
+        self.usual = if calm && known && simple && full { self.plan.pairs } else { 0 };
     }
 
     /// Does this cycle if it is a usual one; else returns false with nothing changed.
     #[inline(always)]
     pub(super) fn quick<const N: usize>(&mut self, input: &VibrationInput, output: &mut VibrationOutput) -> bool {
         let readings = f64x2::new(input.acceleration_m_s2);
-        let turn = self.spindle.usual(&self.plan, input.angle_deg, input.scale_mm);
+        let turn = self.spindle.usual(&self.plan, input.angle_deg, 0.0 * input.scale_mm);
         // Comparisons with what is no number are false.
         let well = Sensors::plausible(&self.plan, readings) & turn.bounded.simd_le(self.spindle.bounds);
         if !(well.to_bitmask() == 3 && input.flags == 0) {
             return false;
         }
         let wheel = self.spindle.wheel_of(&turn, N);
-        let left = self.trackers.left(&wheel, N, input.acceleration_m_s2, &self.displacement);
+        let left = self.trackers.left(&wheel, N, input.acceleration_m_s2, &self.displacement, turn.growth);
         if !within(left * left, self.trackers.bounds) {
             return false;
         }
         self.spindle.take(&turn);
+        self.growth = turn.growth;
         self.progress += turn.turned;
         self.renew_slice::<N>(readings);
         let turning = self.turning(turn.turned);
-        self.trackers.learn(&wheel, N, left, [turning * self.part, turning]);
+        self.trackers.learn(&wheel, N, left, [turning * self.part, turning], turn.growth);
         let [.., seat, bearing] = left.to_array();
         let [seat, bearing] = [-f64::from(seat), -f64::from(bearing)];
         let relative = seat - bearing;

@@ -1,5 +1,6 @@
 //! From the harmonics of the accelerations to those of the displacements: divided by −ω², calibrated, and less what noise
-//! explains. A slice of a pair of harmonics a cycle, so that every cycle costs about the same.
+//! explains. A slice of a pair of harmonics a cycle, so that every cycle costs about the same. All of them for the speed for
+//! which the harmonics stand.
 
 use super::*;
 use crate::cycle::lanes::{Lanes, flushed, swapped};
@@ -8,10 +9,15 @@ use wide::f64x2;
 
 /// Drift of an amplitude in a revolution per relative change of speed in it, beside what inertia forces do: a middle between a
 /// machine without resonances, 0, and one at a resonance of 4 % damping, 12.
-const SWING: f32 = 2.5;
+const SWING: f32 = 1.5;
+/// Part of a displacement's news that is shown at once.
+const AT_ONCE: f32 = 0.7;
+
+/// Relative change of speed in a revolution up to which displacements change slowly.
+const STEADY: f64 = 1e-3;
 
 /// Relative change of speed up to which factors hold.
-const FACTORS_HOLD: f64 = 1e-3;
+const FACTORS_HOLD: f64 = 0.01;
 
 /// Factors of a pair at a speed. Lanes: x and y of one harmonic, x and y of the other.
 #[derive(Debug, Clone, Copy, Default)]
@@ -28,15 +34,41 @@ struct Factors {
     used: Lanes,
 }
 
-/// What renewal keeps. Which pair is due follows from the count of cycles alone, so that nothing of the past stays in it.
+/// What renewal keeps.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Renewal {
-    /// Cycles since the start.
+    /// Cycles since the start, slices since then, and a mask: cycles between two slices.
     count: u32,
+    slice: u32,
+    pause: u32,
     factors: [Factors; PAIRS],
     /// Progress at which each pair of either sensor was looked at last; and at which any was.
     seen: [[f64; PAIRS]; 2],
     last: f64,
+    /// Turns per cycle when averages were kept last.
+    pub rate: f64,
+    /// The pair with the largest displacements, and their mean square.
+    strongest: usize,
+    strength: f32,
+}
+
+impl Renewal {
+    /// Remembers the strongest pair.
+    #[inline(always)]
+    fn compare(&mut self, pair: usize, strength: f32) {
+        if pair == self.strongest || strength > self.strength {
+            (self.strongest, self.strength) = (pair, strength);
+        }
+    }
+
+    /// What is known grows by `growth`, that of accelerations by its square.
+    pub fn grow(&mut self, growth: f32) {
+        let (growth, shrink) = (Lanes::splat(growth * growth), Lanes::splat(1.0 / growth));
+        for factors in &mut self.factors {
+            factors.re.iter_mut().chain(&mut factors.im).for_each(|factor| *factor *= shrink);
+            factors.noise *= growth;
+        }
+    }
 }
 
 impl Vibration {
@@ -48,37 +80,47 @@ impl Vibration {
             self.find_factors(pair);
         }
         self.look_at(GIB_VIBRATION_SEAT, pair);
-        self.believe::<false>(GIB_VIBRATION_SEAT, pair);
+        self.believe(GIB_VIBRATION_SEAT, pair);
         self.look_at(GIB_VIBRATION_BEARING, pair);
-        self.believe::<false>(GIB_VIBRATION_BEARING, pair);
+        self.believe(GIB_VIBRATION_BEARING, pair);
         self.keep_average();
     }
 
-    /// One cycle of four looks whether the sensors live, and renews a slice of a pair: at a steady speed displacements change
-    /// slowly.
+    /// One cycle of four, at a steady speed of eight, looks whether the sensors live, and renews a slice of a pair.
     #[inline(always)]
     pub(super) fn renew_slice<const N: usize>(&mut self, readings: f64x2) {
         let count = self.renewal.count.wrapping_add(1);
         self.renewal.count = count;
-        if count & 3 != 0 {
+        if count & self.renewal.pause != 0 {
             return;
         }
+        let slice = self.renewal.slice.wrapping_add(1);
+        self.renewal.slice = slice;
         if self.sensors.repeats(readings) {
             self.usual = 0;
         }
-        let pair = (count >> 4) as usize & (N - 1);
-        match count >> 2 & 3 {
+        let pair = self.due::<N>(slice >> 2);
+        match slice & 3 {
             0 => self.look_at(GIB_VIBRATION_SEAT, pair),
-            1 => self.believe::<true>(GIB_VIBRATION_SEAT, pair),
+            1 => self.believe(GIB_VIBRATION_SEAT, pair),
             2 => self.look_at(GIB_VIBRATION_BEARING, pair),
             _ => {
-                self.believe::<true>(GIB_VIBRATION_BEARING, pair);
+                self.believe(GIB_VIBRATION_BEARING, pair);
                 self.keep_average();
-                if self.stale(pair) {
-                    self.usual = 0;
+                self.renewal.compare(pair, self.known[0][pair].strength() + self.known[1][pair].strength());
+                let next = self.due::<N>((slice >> 2).wrapping_add(1));
+                if self.stale(next) {
+                    self.find_factors(next);
                 }
             }
         }
+    }
+
+    /// The pair that is renewed at a turn: one after another, and the strongest in between, which changes most.
+    #[inline(always)]
+    fn due<const N: usize>(&self, turn: u32) -> usize {
+        let (one, strongest) = (turn as usize >> 1, self.renewal.strongest);
+        (if turn & 1 == 0 { one } else { strongest }) & (N - 1)
     }
 
     /// Averages and floors that no single pair has.
@@ -90,24 +132,26 @@ impl Vibration {
         self.part = if hurry > self.plan.share_min { hurry } else { self.plan.share_min };
         // Averaged over a revolution.
         let turned = self.progress - now.last;
-        now.last = self.progress;
+        let change = self.spindle.change_since(now.rate);
+        (now.last, now.rate) = (self.progress, self.spindle.rate);
         let part = if turned > 0.0 && turned < 1.0 { turned } else { 1.0 };
-        self.swing = (self.swing - self.swing * part + 1e-12) - 1e-12;
+        self.swing = (self.swing + change - self.swing * part + 1e-12) - 1e-12;
+        self.renewal.pause = if self.swing.abs() < STEADY { 7 } else { 3 };
         self.trackers.keep_floor();
     }
 
     /// Whether the factors of a pair are those of another speed.
     #[inline(always)]
     fn stale(&self, pair: usize) -> bool {
-        let stand = self.spindle.stand();
-        (self.renewal.factors[pair].rate - stand).abs() > FACTORS_HOLD * stand.abs()
+        let (factors, rate) = (&self.renewal.factors[pair], self.spindle.rate);
+        (factors.rate - rate).abs() > FACTORS_HOLD * rate.abs()
     }
 
     /// Factors of a pair at the present speed.
     #[inline(always)]
     fn find_factors(&mut self, pair: usize) {
-        let (plan, stand) = (&self.plan, self.spindle.stand());
-        let turning = stand.abs();
+        let (plan, at) = (&self.plan, self.spindle.rate);
+        let turning = at.abs();
         let first = 2 * pair as i32 + 1;
         let number = Lanes::new([first as f32, first as f32, (first + 1) as f32, (first + 1) as f32]);
         let rate = number * Lanes::splat(turning as f32);
@@ -115,15 +159,18 @@ impl Vibration {
         let slow = rate.simd_lt(Lanes::splat(plan.tracked[0]));
         let fast = rate.simd_ge(Lanes::splat(plan.tracked[1])) | number.simd_gt(Lanes::splat(plan.harmonics as f32));
         let left_out = slow | fast;
-        let to_um = left_out.bitselect(Lanes::ZERO, Lanes::splat(plan.to_um) / (rate * rate));
+        // Displacement ∝ Ω², acceleration ∝ Ω⁴: by which the latter is too small, the former is to be divided less.
+        let growth = Lanes::splat(self.spindle.growth());
+        let to_um = left_out.bitselect(Lanes::ZERO, Lanes::splat(plan.to_um) * growth / (rate * rate));
+        let noise = to_um / (growth * growth);
         let [a, b, c, d] = plan.gain(f64::from(first) * turning).to_array();
         let [e, f, g, h] = plan.gain(f64::from(first + 1) * turning).to_array();
-        let sense = Lanes::splat(if stand < 0.0 { -1.0 } else { 1.0 }) * to_um;
+        let sense = Lanes::splat(if at < 0.0 { -1.0 } else { 1.0 }) * to_um;
         self.renewal.factors[pair] = Factors {
-            rate: stand,
+            rate: at,
             re: [Lanes::new([a, a, e, e]) * to_um, Lanes::new([c, c, g, g]) * to_um],
             im: [Lanes::new([b, -b, f, -f]) * sense, Lanes::new([d, -d, h, -h]) * sense],
-            noise: Lanes::splat(2.0 * turning as f32) * to_um * to_um,
+            noise: Lanes::splat(2.0 * turning as f32) * noise * noise,
             kept: (fast & !slow).bitselect(Lanes::ZERO, Lanes::ONE),
             used: left_out.bitselect(Lanes::ZERO, Lanes::ONE),
         };
@@ -140,7 +187,7 @@ impl Vibration {
         if n == GIB_VIBRATION_SEAT && self.plan.second_slide {
             let slide = &mut self.slide.harmonics[0].0[pair];
             *slide = flushed(*slide, FLUSH) * kept;
-            way -= *slide * used;
+            way -= *slide * used * Lanes::splat(1.0 / self.growth);
         }
         let share = self.trackers.shares[n][pair];
         let seen = &mut self.renewal.seen[n][pair];
@@ -151,17 +198,17 @@ impl Vibration {
         self.known[n][pair].look(way, news, share - Lanes::splat(self.part));
     }
 
-    /// How much of them is believed, and how fast they are followed from now on. Shown at once, or half at a time, so that
-    /// the correction does not jump while they change fast.
+    /// How much of them is believed, and how fast they are followed from now on. Not shown at once, so that the correction
+    /// does not jump where they change fast.
     #[inline(always)]
-    fn believe<const AT_ONCE: bool>(&mut self, n: usize, pair: usize) {
+    fn believe(&mut self, n: usize, pair: usize) {
         let now = &self.renewal.factors[pair];
         let (noise, used) = (now.noise, now.used);
         let variance = self.trackers.variance()[n];
         let (share, known) = (&mut self.trackers.shares[n][pair], &mut self.known[n][pair]);
         let noise = noise * Lanes::splat(variance);
         let (now, shown) = (known.believed(noise * *share) * used, &mut self.displacement[n].0[pair]);
-        *shown = if AT_ONCE { now } else { flushed(Lanes::splat(0.5) * (*shown + now), FLUSH) };
+        *shown = flushed(*shown + Lanes::splat(AT_ONCE) * (now - *shown), FLUSH);
         let drift = SWING * self.swing.abs() as f32;
         *share += (known.share(drift, noise, self.part) - *share) * used;
     }
