@@ -58,12 +58,15 @@ variable gib_backlash_output out;
 variable double drive_safe = 0.0;
 variable double cmd_safe = 0.0;
 variable double back = 0.0;
+variable double told_amount = NAN; /* what the pins say */
+variable double told_corr = NAN;
 variable int wait = 0;
 variable unsigned asked = 0;
 variable int fault = 0;
 variable int running = 0;
 variable int owed = 0; /* gib waits for an acknowledgement */
 variable int awake = 0; /* something goes on, or did in the last cycle */
+variable int unusual = 0; /* awake, or a fault lasts */
 variable int started = 0;
 variable int restored = 0;
 
@@ -184,6 +187,14 @@ static void work(struct __comp_state *__comp_inst, long period)
     awake = start || restore || running || owed || busy || back != 0.0;
 }
 
+/* Tells the amount in force, and whether LinuxCNC applies it. */
+__attribute__((noinline, cold)) static void tell(struct __comp_state *__comp_inst)
+{
+    compensation = told_amount = amount;
+    told_corr = backlash_corr;
+    active = fabs(2.0 * fabs(told_corr) - told_amount) < 1e-6;
+}
+
 /* A cycle that is not as usual: a fault, the machine off, or work. */
 __attribute__((noinline, cold)) static void any(struct __comp_state *__comp_inst, int good, long period)
 {
@@ -195,21 +206,23 @@ __attribute__((noinline, cold)) static void any(struct __comp_state *__comp_inst
         position_fb = drive_safe;
     }
     ok = ok_in && !fault;
+    unusual = awake | (fault != 0);
+    tell(__comp_inst);
 }
 
 FUNCTION(_)
 {
-    double cmd = position_cmd, fb = drive_fb, now;
+    double cmd = position_cmd, fb = drive_fb;
     /* What is no number goes nowhere: the last safe value stays, and motion is told. */
     int good = gib_hal_both_held(cmd, fb, &cmd_safe, &drive_safe);
-    if (!good | !enable | start | restore | awake | fault) {
+    if (!good | !enable | start | restore | unusual) {
         any(__comp_inst, good, period);
-    } else {
-        drive_cmd = cmd;
-        position_fb = fb;
-        ok = ok_in;
+        return;
     }
-    now = amount;
-    compensation = now;
-    active = fabs(2.0 * fabs(backlash_corr) - now) < 1e-6;
+    drive_cmd = cmd;
+    position_fb = fb;
+    ok = ok_in;
+    if (amount != told_amount || backlash_corr != told_corr) {
+        tell(__comp_inst);
+    }
 }

@@ -57,6 +57,7 @@ variable gib_speed_variation_input asked;
 variable gib_speed_variation_output swing;
 variable int running = 0;
 variable int measured = 0;
+variable int awake = 0; /* a measurement goes on, or is still asked for */
 variable int started = 0; /* to vary, since vary rose */
 variable int swinging = 0;
 variable int fault = 0;
@@ -157,6 +158,7 @@ __attribute__((noinline, cold)) static int measuring(struct __comp_state *__comp
         }
     }
     busy = running;
+    awake = running | measured;
     return running && out.owns_motion;
 }
 
@@ -172,6 +174,7 @@ __attribute__((noinline, cold)) static void wait_to_vary(struct __comp_state *__
         varying = swinging;
         started = 1;
     }
+    started = swinging || (started && vary && speed_safe != 0.0);
 }
 
 /* The variation has ended. */
@@ -180,13 +183,14 @@ __attribute__((noinline, cold)) static void end_of_variation(struct __comp_state
     swinging = 0;
     varying = 0;
     torque_ff = amplitude_now = 0.0;
+    started = vary && speed_safe != 0.0;
 }
 
 /* One cycle of the variation: the speed to be commanded. A stop is a stop, whatever is still to be wound down. */
-static double varied(struct __comp_state *__comp_inst, double wanted)
+static inline double varied(struct __comp_state *__comp_inst, int sound)
 {
-    int go_on = vary & enable & !fault & (wanted != 0.0) & (ina > 0.0);
-    asked.speed_rpm = wanted;
+    int go_on = vary && sound && ina * fabs(speed_safe) > 0.0;
+    asked.speed_rpm = speed_safe;
     asked.amplitude_ratio = amplitude;
     asked.period_s = swing_time;
     asked.flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (go_on ? 0 : GIB_SPEED_VARIATION_STOP);
@@ -195,33 +199,48 @@ static double varied(struct __comp_state *__comp_inst, double wanted)
     amplitude_most = swing.amplitude_limit_ratio;
     if (status != GIB_BUSY) {
         end_of_variation(__comp_inst);
-        return wanted;
+        return speed_safe;
     }
     torque_ff = swing.torque_nm;
     amplitude_now = swing.amplitude_ratio;
-    return wanted != 0.0 ? swing.speed_command_rpm : wanted;
+    return asked.flags && speed_safe == 0.0 ? speed_safe : swing.speed_command_rpm;
+}
+
+/* The speed to be commanded; sound: the machine is on, and there is no fault. */
+static inline double commanded(struct __comp_state *__comp_inst, int sound, long period)
+{
+    if ((measure | awake) && measuring(__comp_inst, period * 1e-9)) {
+        return out.speed_command_rpm;
+    }
+    if (swinging) {
+        return varied(__comp_inst, sound);
+    }
+    if (vary | started) {
+        wait_to_vary(__comp_inst, period * 1e-9);
+    }
+    return speed_safe;
+}
+
+/* A cycle with a fault, which lasts until the machine is off, or with the machine off. */
+__attribute__((noinline, cold)) static void unsound(struct __comp_state *__comp_inst, long period)
+{
+    int good = gib_hal_held(speed_cmd, &speed_safe) & isfinite(drive_speed);
+    fault = !good ? GIB_ERR_NON_FINITE : enable ? fault : 0;
+    double wanted = commanded(__comp_inst, enable && !fault, period);
+    drive_speed_cmd = enable ? wanted : 0.0;
+    ok = ok_in & !fault;
 }
 
 FUNCTION(_)
 {
-    double wanted;
+    double wanted = speed_cmd, sum = wanted + drive_speed;
     /* What is no number goes nowhere: the last safe value stays, and motion is told. */
-    int good = gib_hal_held(speed_cmd, &speed_safe) & isfinite(drive_speed);
-    if (!good | !enable | fault) {
-        fault = !good ? GIB_ERR_NON_FINITE : enable ? fault : 0;
+    if (isnan(sum - sum) | !enable | fault) {
+        unsound(__comp_inst, period);
+        return;
     }
-    wanted = speed_safe;
-    if ((measure | measured | running) && measuring(__comp_inst, period * 1e-9)) {
-        wanted = out.speed_command_rpm;
-    } else if (vary | started) {
-        if (!swinging) {
-            wait_to_vary(__comp_inst, period * 1e-9);
-        }
-        if (swinging) {
-            wanted = varied(__comp_inst, wanted);
-        }
-        started = swinging || (started && vary && wanted != 0.0);
-    }
-    drive_speed_cmd = enable ? wanted : 0.0;
-    ok = ok_in & !fault;
+    speed_safe = wanted;
+    wanted = commanded(__comp_inst, 1, period);
+    drive_speed_cmd = wanted;
+    ok = ok_in;
 }

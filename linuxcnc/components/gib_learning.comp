@@ -47,9 +47,7 @@ param rw float lag = 0 "of the servo, s";
 variable gib_learning *gib;
 variable gib_learning_input in;
 variable gib_learning_output out;
-variable int told_status = 0; /* what the pins say */
-variable int told_phase = 0;
-variable unsigned told_reasons = 0;
+variable gib_learning_output told; /* what the pins say */
 variable double cmd_safe = 0.0;
 variable double fb_safe = 0.0;
 variable double shift = 0.0; /* the correction, mm */
@@ -102,9 +100,9 @@ __attribute__((noinline, cold)) static void tell(struct __comp_state *__comp_ins
     deviation = report.last_um;
     first = report.first_um;
     update_count = report.updates;
-    told_status = status;
-    state = told_phase = out.phase;
-    why = told_reasons = out.reasons;
+    told = out;
+    state = out.phase;
+    why = out.reasons;
     done = status == GIB_DONE;
     error = status < 0 && status != GIB_ERR_ABORTED ? status : 0;
     /* What was learnt stays in force at the end of these. */
@@ -118,11 +116,11 @@ static void learn(struct __comp_state *__comp_inst, unsigned flags)
     in.target_mm = cmd_safe;
     in.detected_mm = valid ? detected : NAN;
     in.angle_deg = angle;
-    in.flags = flags;
+    in.flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (on ? 0 : GIB_INPUT_ABORT) | flags;
     int32_t status = gib_learning_step(gib, &in, &out);
     correction = out.correction_um;
     shift = 1e-3 * out.correction_um;
-    if ((status ^ told_status) | (out.phase ^ told_phase) | (int)(out.reasons ^ told_reasons)) {
+    if (gib_hal_differ(out, told, status, reasons)) {
         tell(__comp_inst, status);
     }
 }
@@ -139,14 +137,23 @@ __attribute__((noinline, cold)) static void ask(struct __comp_state *__comp_inst
     done = 0;
 }
 
+/* A fault lasts until the machine is off; what learning must be told. */
+__attribute__((noinline, cold)) static unsigned doubt(struct __comp_state *__comp_inst, int good)
+{
+    fault = !good ? GIB_ERR_NON_FINITE : enable ? fault : 0;
+    ok = ok_in & !fault;
+    return (fault ? GIB_INPUT_FAULT : 0) | (enable ? 0 : GIB_INPUT_ABORT);
+}
+
 FUNCTION(_)
 {
     /* What is no number goes nowhere: the last safe value stays, and motion is told. */
     int good = gib_hal_both_held(position_cmd, drive_fb, &cmd_safe, &fb_safe);
-    unsigned flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (on ? 0 : GIB_INPUT_ABORT);
+    unsigned flags = 0;
     if (!good | !enable | fault) {
-        fault = !good ? GIB_ERR_NON_FINITE : enable ? fault : 0;
-        flags |= (fault ? GIB_INPUT_FAULT : 0) | (enable ? 0 : GIB_INPUT_ABORT);
+        flags = doubt(__comp_inst, good);
+    } else {
+        ok = ok_in;
     }
     if (awake) {
         learn(__comp_inst, flags);
@@ -155,5 +162,4 @@ FUNCTION(_)
     }
     drive_cmd = cmd_safe + shift;
     position_fb = fb_safe - shift;
-    ok = ok_in & !fault;
 }

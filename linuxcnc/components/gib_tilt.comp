@@ -75,7 +75,7 @@ param rw bit rtcp = 0 "the control keeps the tool at the workpiece when rotary a
 variable gib_tilt *gib;
 variable gib_tilt_input in;
 variable gib_tilt_output out;
-variable int told_phase = 0; /* what the pins say */
+variable gib_tilt_output told; /* what the pins say */
 variable double cmd_safe = 0.0;
 variable double fb_safe = 0.0;
 variable double shift = 0.0; /* z's offset, mm */
@@ -154,13 +154,15 @@ __attribute__((noinline, cold)) static void tell(struct __comp_state *__comp_ins
     offset_b = out.offset_deg[1];
     offset_c = out.offset_deg[2];
     state = out.phase;
-    told_phase = out.phase == GIB_TILT_RAMP_ON || out.phase == GIB_TILT_RAMP_OFF ? -1 : out.phase;
+    told = out;
+    told.phase = out.phase == GIB_TILT_RAMP_ON || out.phase == GIB_TILT_RAMP_OFF ? -1 : out.phase;
     active = out.phase == GIB_TILT_ACTIVE;
     warn = out.warning;
     awake = status == GIB_BUSY;
     busy = awake;
     error = status < 0 ? status : 0;
     fault = status == GIB_ERR_NON_FINITE ? status : fault;
+    ok = ok_in & !fault;
 }
 
 /* One cycle of a measurement, or of an offset that comes, stays or goes. */
@@ -169,20 +171,22 @@ static void work(struct __comp_state *__comp_inst)
     in.position_mm[0] = x;
     in.position_mm[1] = y;
     in.position_mm[2] = z;
-    in.load = spindle_load;
-    in.speed_rpm = speed;
-    in.flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (cutting ? GIB_TILT_INPUT_CUTTING : 0) |
-               (finish ? GIB_TILT_INPUT_END : 0) | (off ? GIB_TILT_INPUT_OFF : 0);
+    in.flags = (drive_fault ? GIB_INPUT_FAULT : 0) | (off ? GIB_TILT_INPUT_OFF : 0);
+    if (out.phase != GIB_TILT_ACTIVE) { /* an offset in force does not depend on the cut */
+        in.load = spindle_load;
+        in.speed_rpm = speed;
+        in.flags |= (cutting ? GIB_TILT_INPUT_CUTTING : 0) | (finish ? GIB_TILT_INPUT_END : 0);
+    }
     if (turns) {
         in.rotary_deg[0] = angle_a;
         in.rotary_deg[1] = angle_b;
         in.rotary_deg[2] = angle_c;
     }
     int32_t status = gib_tilt_step(gib, &in, &out);
-    if (accept) {
+    if (out.warning && accept) {
         in.acknowledged_id = out.request_id;
     }
-    if ((status ^ GIB_BUSY) | (out.phase ^ told_phase)) {
+    if (gib_hal_differ(out, told, status, phase)) {
         tell(__comp_inst, status);
     }
     offset_z = shift = out.offset_mm[2];
@@ -191,7 +195,7 @@ static void work(struct __comp_state *__comp_inst)
 /* A measurement may be asked for. */
 __attribute__((noinline, cold)) static void ask(struct __comp_state *__comp_inst, long period)
 {
-    if (start && !started && enable && !awake && !fault) {
+    if (start && !started && enable && !fault) {
         error = begin(__comp_inst, period * 1e-9);
         awake = error == GIB_OK;
         busy = awake;
@@ -200,20 +204,27 @@ __attribute__((noinline, cold)) static void ask(struct __comp_state *__comp_inst
     started = start;
 }
 
+/* A fault lasts until the machine is off. */
+__attribute__((noinline, cold)) static void doubt(struct __comp_state *__comp_inst, int good)
+{
+    fault = !good ? GIB_ERR_NON_FINITE : enable ? fault : 0;
+    ok = ok_in & !fault;
+}
+
 FUNCTION(_)
 {
     /* What is no number goes nowhere: the last safe value stays, and motion is told. */
     int good = gib_hal_both_held(position_cmd, drive_fb, &cmd_safe, &fb_safe);
     if (!good | !enable | fault) {
-        fault = !good ? GIB_ERR_NON_FINITE : enable ? fault : 0;
-    }
-    if (start | started) {
-        ask(__comp_inst, period);
+        doubt(__comp_inst, good);
+    } else {
+        ok = ok_in;
     }
     if (awake) {
         work(__comp_inst);
+    } else if (start | started) {
+        ask(__comp_inst, period);
     }
     drive_cmd = cmd_safe + shift;
     position_fb = fb_safe - shift;
-    ok = ok_in & !fault;
 }

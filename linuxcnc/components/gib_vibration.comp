@@ -33,9 +33,7 @@ param rw float averaging = 0 "turns over which they are averaged";
 variable gib_vibration *gib;
 variable gib_vibration_input in;
 variable gib_vibration_output out;
-variable int told_phase = 0; /* what the pins say */
-variable unsigned told_reasons = 0;
-variable double told_blend = 0.0;
+variable gib_vibration_output told; /* what the pins say */
 variable double safe = 0.0;
 variable int asked = 0;
 variable int running = 0;
@@ -78,16 +76,17 @@ __attribute__((noinline, cold)) static void tell(struct __comp_state *__comp_ins
 {
     running = status == GIB_BUSY;
     error = running || status == GIB_ERR_ABORTED ? 0 : status;
-    state = told_phase = out.phase;
-    why = told_reasons = out.reasons;
-    blend = told_blend = out.blend_ratio;
+    told = out;
+    state = out.phase;
+    why = out.reasons;
+    blend = out.blend_ratio;
     in_force = out.blend_ratio == 1.0;
 }
 
 /* A cycle in which the correction is in force, comes or goes. */
-static void work(struct __comp_state *__comp_inst)
+static void work(struct __comp_state *__comp_inst, double now)
 {
-    in.scale_mm = scale;
+    in.scale_mm = now;
     in.angle_deg = angle;
     in.acceleration_m_s2[0] = seat;
     in.acceleration_m_s2[1] = bearing;
@@ -95,7 +94,7 @@ static void work(struct __comp_state *__comp_inst)
     int32_t status = gib_vibration_step(gib, &in, &out);
     position = out.position_mm;
     correction = out.correction_um;
-    if ((status ^ GIB_BUSY) | (out.phase ^ told_phase) | (int)(out.reasons ^ told_reasons) || out.blend_ratio != told_blend) {
+    if (gib_hal_differ(out, told, blend_ratio, reasons)) {
         tell(__comp_inst, status);
     }
 }
@@ -108,20 +107,20 @@ __attribute__((noinline, cold)) static void ask(struct __comp_state *__comp_inst
         running = error == GIB_OK;
     }
     asked = on;
-    correction = blend = told_blend = 0.0;
+    correction = blend = told.blend_ratio = 0.0;
     in_force = 0;
 }
 
 FUNCTION(_)
 {
-    int good = gib_hal_held(scale, &safe);
+    double now = scale;
+    ok = gib_hal_held(now, &safe) & ok_in;
     if (running) {
-        work(__comp_inst);
+        work(__comp_inst, now);
     } else {
         if (on | asked) {
             ask(__comp_inst, period);
         }
         position = safe;
     }
-    ok = ok_in & good;
 }

@@ -24,7 +24,7 @@ impl Vibration {
         let turn = self.spindle.usual(&self.plan, input.angle_deg, 0.0 * input.scale_mm);
         // Comparisons with what is no number are false.
         let well = Sensors::plausible(&self.plan, readings) & turn.bounded.simd_le(self.spindle.bounds);
-        if !(well.to_bitmask() == 3 && input.flags == 0) {
+        if well.to_bitmask().wrapping_sub(3) | input.flags != 0 {
             return false;
         }
         let wheel = self.spindle.wheel_of(&turn, N);

@@ -11,13 +11,13 @@ use wide::f64x2;
 /// machine without resonances, 0, and one at a resonance of 4 % damping, 12.
 const SWING: f32 = 1.5;
 /// Part of a displacement's news that is shown at once.
-const AT_ONCE: f32 = 0.7;
+const AT_ONCE: f32 = 0.8;
 
 /// Relative change of speed in a revolution up to which displacements change slowly.
 const STEADY: f64 = 1e-3;
 
 /// Relative change of speed up to which factors hold.
-const FACTORS_HOLD: f64 = 0.01;
+const FACTORS_HOLD: f64 = 0.02;
 
 /// Factors of a pair at a speed. Lanes: x and y of one harmonic, x and y of the other.
 #[derive(Debug, Clone, Copy, Default)]
@@ -34,13 +34,12 @@ struct Factors {
     used: Lanes,
 }
 
-/// What renewal keeps.
+/// What renewal keeps. Which slice is due follows from the count of cycles, so that nothing of the past stays in it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Renewal {
-    /// Cycles since the start, slices since then, and a mask: cycles between two slices.
+    /// Cycles since the start, and those between two slices: 3 or 7.
     count: u32,
-    slice: u32,
-    pause: u32,
+    between: u32,
     factors: [Factors; PAIRS],
     /// Progress at which each pair of either sensor was looked at last; and at which any was.
     seen: [[f64; PAIRS]; 2],
@@ -86,16 +85,15 @@ impl Vibration {
         self.keep_average();
     }
 
-    /// One cycle of four, at a steady speed of eight, looks whether the sensors live, and renews a slice of a pair.
+    /// One cycle of some looks whether the sensors live, and renews a slice of a pair.
     #[inline(always)]
     pub(super) fn renew_slice<const N: usize>(&mut self, readings: f64x2) {
         let count = self.renewal.count.wrapping_add(1);
         self.renewal.count = count;
-        if count & self.renewal.pause != 0 {
+        if count & self.renewal.between != 0 {
             return;
         }
-        let slice = self.renewal.slice.wrapping_add(1);
-        self.renewal.slice = slice;
+        let slice = count >> self.renewal.between.trailing_ones();
         if self.sensors.repeats(readings) {
             self.usual = 0;
         }
@@ -136,7 +134,7 @@ impl Vibration {
         (now.last, now.rate) = (self.progress, self.spindle.rate);
         let part = if turned > 0.0 && turned < 1.0 { turned } else { 1.0 };
         self.swing = (self.swing + change - self.swing * part + 1e-12) - 1e-12;
-        self.renewal.pause = if self.swing.abs() < STEADY { 7 } else { 3 };
+        self.renewal.between = if self.swing.abs() < STEADY { 7 } else { 3 };
         self.trackers.keep_floor();
     }
 
