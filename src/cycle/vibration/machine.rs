@@ -8,10 +8,11 @@
 //! they are not: nothing it does is a jump. A bad sensor is not read; its last harmonics go on turning until the
 //! correction has faded out. In every other state, and whatever happens, the position is the plain scale.
 
+mod follow;
 mod quick;
 mod renew;
 
-use super::harmonic::{Harmonics, PAIRS, Trackers, grow};
+use super::harmonic::{Harmonics, PAIRS, Trackers};
 use super::integrate::Integrator;
 use super::io::*;
 use super::known::Known;
@@ -292,31 +293,6 @@ impl Vibration {
             // The second slide moves by command, however fast the spindle turns.
             growth = 1.0;
         }
-    }
-
-    /// The harmonics follow the speed.
-    fn follow(&mut self) {
-        let leapt = self.spindle.leapt();
-        if leapt {
-            self.renewal.rate = self.spindle.rate;
-        } else {
-            self.growth = self.spindle.growth();
-        }
-        if leapt || self.spindle.far() {
-            self.settle();
-        }
-    }
-
-    /// The harmonics say the same as before, and stand for the present speed from now on.
-    #[inline(never)]
-    fn settle(&mut self) {
-        let (growth, pairs) = (self.growth, self.plan.pairs);
-        grow(&mut self.trackers.harmonics, pairs, growth * growth);
-        grow(&mut self.displacement, pairs, growth);
-        self.known.iter_mut().flatten().for_each(|known| known.grow(growth));
-        self.renewal.grow(growth);
-        self.growth = 1.0;
-        self.spindle.settle(&self.plan);
     }
 
     /// Part of a turn that a cycle counts for: no more than the trackers can bear.
