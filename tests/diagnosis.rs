@@ -106,6 +106,30 @@ fn two_at_once_are_both_found() {
 }
 
 #[test]
+fn a_ripple_of_few_periods_over_the_stroke_is_found_and_a_single_swing_is_none() {
+    // The stroke is 144 mm: about two, three and five periods.
+    for period in [70.0, 50.0, 28.0] {
+        let ripple = recording(|_, x, _, _| 0.2 * (TAU * x / period + 0.7).sin());
+        finds(Cause::Cogging, &[0.2, period], 0.01, &ripple);
+    }
+    let detent = |_: f64, x: f64, _: f64, _: f64| {
+        let u = (x - 110.0) / 9.0;
+        0.5 * u * (-u * u).exp()
+    };
+    let d = judged(&recording(detent));
+    assert_eq!((d.verdict, d.findings.len()), (Verdict::UnknownCause, 0), "{d:?}");
+    assert!(d.unexplained.describes.contains("position"), "{}", d.unexplained.describes);
+}
+
+#[test]
+fn a_bump_of_friction_at_one_speed_is_no_sum_of_frictions() {
+    let bump = |_: f64, _: f64, v: f64, _: f64| 0.4 * v.signum() * (-((v.abs() - 50.0) / 12.0).powi(2)).exp();
+    let d = judged(&recording(bump));
+    assert_eq!((d.verdict, d.findings.len()), (Verdict::UnknownCause, 0), "{d:?}");
+    assert!(d.unexplained.describes.contains("velocity"), "{}", d.unexplained.describes);
+}
+
+#[test]
 fn what_fits_nothing_is_called_unknown() {
     // A torque that jumps between levels at irregular times.
     let level = |t: f64| if ((t * 0.37).sin() + (t * 0.83).sin()) > 0.2 { 0.25 } else { -0.25 };

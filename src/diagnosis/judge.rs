@@ -11,6 +11,7 @@ use super::frame::Columns;
 use super::gain::{self, Gain};
 use super::progress::{Stopped, Watch};
 use super::select::Selection;
+use super::show::{self, Coordinate};
 use super::verdict::Verdict;
 use crate::machine::{Axis, Cause};
 
@@ -22,6 +23,12 @@ const LEAST_EXPLAINED: f64 = 0.8;
 const LEAST_EXPLAINED_LOST_MOTION: f64 = 0.4;
 /// Excess (in variance) that may be left for everything to count as explained.
 const LITTLE_LEFT: f64 = 0.5;
+
+/// Share of what is explained above which it is mostly a curve over one coordinate.
+const MOSTLY: f64 = 2.0 / 3.0;
+/// Share of what is explained (in variance) that may be left along that coordinate: a sixth in amplitude. Laws of the right form
+/// leave a hundredth of that; several of a wrong form together imitate a curve, and leave more.
+const MOST_OF_A_CURVE: f64 = 0.03;
 
 /// What stays the same while sets of causes are judged.
 pub struct Judge<'j, 'f, 'a> {
@@ -111,14 +118,34 @@ impl Judge<'_, '_, '_> {
         let lost_motion = fit.parts.iter().any(|p| p.law.cause == Cause::Backlash);
         let least = if lost_motion { LEAST_EXPLAINED_LOST_MOTION } else { LEAST_EXPLAINED };
         let too_little = before.largest() > TOLERABLE_EXCESS && before.explained_by(&after) < least;
-        if fit.parts.is_empty() || too_little {
+        let much_left = after.largest() > LITTLE_LEFT;
+        if fit.parts.is_empty() || too_little || much_left && is_another_curve(self.bench, self.empty, fit) {
             None
-        } else if after.largest() > LITTLE_LEFT {
+        } else if much_left {
             Some(Verdict::PartlyExplained)
         } else {
             Some(Verdict::Explained)
         }
     }
+}
+
+/// Whether what is explained is mostly a curve over speed, or along the stroke, and is not that curve: too much of it is left.
+fn is_another_curve(bench: &Bench, empty: &Fit, fit: &Fit) -> bool {
+    use Cause::*;
+    let speed =
+        [CoulombFrictionMismatch, ViscousFrictionMismatch, StribeckFriction, QuadraticDrag, DirectionDependentFriction];
+    let curves: [(Coordinate, &[Cause]); 2] =
+        [(Coordinate::Velocity, &speed), (Coordinate::Position, &[Cogging, CableForce, PositionDependentFriction])];
+    let squares = |fit: &Fit| fit.residual[..bench.rows].iter().map(|r| r * r).sum::<f64>();
+    let (left, explained) = (squares(fit), squares(empty) - squares(fit));
+    explained > 0.0
+        && curves.into_iter().any(|(coordinate, causes)| {
+            let laws = (0..fit.parts.len()).filter(|&i| causes.contains(&fit.parts[i].law.cause));
+            let mut curve = vec![0.0; bench.rows];
+            laws.for_each(|i| curve.iter_mut().zip(fit.contribution(i)).for_each(|(sum, c)| *sum += c));
+            curve.iter().map(|c| c * c).sum::<f64>() > MOSTLY * explained
+                && show::share_along(bench, fit, coordinate) * left > MOST_OF_A_CURVE * explained
+        })
 }
 
 /// Whether a machine is known to be worse than the belief: surely so in torque or motor position, and in both together. The

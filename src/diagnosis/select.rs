@@ -8,6 +8,7 @@
 use super::approach::Approach;
 use super::blocks;
 use super::causes::Law;
+use super::causes::periods::{FEW, is_in_each_period};
 use super::fit::{Bench, Fit, Part, figure};
 use super::progress::{Stopped, Watch};
 use super::uncertainty;
@@ -29,6 +30,8 @@ pub const LEAST_GAIN: f64 = 0.08;
 const SHOWN_AT_START: f64 = 0.25;
 /// Least gain at the best start for a cause to be refined.
 const LEAST_AT_START: f64 = SHOWN_AT_START * LEAST_GAIN;
+/// The same of a ripple of few periods, which explains some of anything that is slow along the stroke: a third of what is left.
+const LEAST_OF_FEW: f64 = 0.4;
 /// What a further fitted number must gain where sets of causes compete.
 const NUMBER_PRICE: f64 = 0.003;
 
@@ -196,13 +199,13 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
     let open: Vec<(&Fit, &'static Law)> =
         beam.iter().flat_map(|set| laws.iter().filter(|law| may_join(set, law)).map(move |law| (set, *law))).collect();
     let half = 0.5 * (from + to);
-    let look = |&(set, law): &(_, _)| at_best_start(search, set, law);
+    let look = |&(set, law): &(_, _)| at_best_starts(search, set, law);
     let mut children: Vec<Child> =
         watch.each(&open, (from, half), "looking for causes", look)?.into_iter().flatten().collect();
     children.sort_by(|a, b| a.price.total_cmp(&b.price));
     // Two sets may grow into the same one, which is refined once, from where it costs less.
     let mut seen = HashSet::new();
-    children.retain(|child| seen.insert(child.causes()));
+    children.retain(|child| seen.insert((child.causes(), few_periods(&child.part))));
     // What cannot come among those that are carried on need not be refined.
     let carried_on = children.get(BEAM - 1).map_or(f64::INFINITY, |child| child.price);
     let mut tried: HashMap<Vec<Cause>, usize> = HashMap::new();
@@ -217,20 +220,21 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
         let count = set.parts.len();
         let fit = bench.refine(bench.fit(parts), count, 6);
         let fit = bench.refine(fit, 0, if count == 0 { 4 } else { 2 });
-        (is_physical(bench, &fit) && price(&fit) < price(set) - 0.5 * LEAST_GAIN).then_some(fit)
+        (is_physical(bench, &fit) && once_only(bench, &fit).is_none() && price(&fit) < price(set) - 0.5 * LEAST_GAIN)
+            .then_some(fit)
     })?;
     let mut grown: Vec<Fit> = refined.into_iter().flatten().collect();
     grown.sort_by(|a, b| price(a).total_cmp(&price(b)));
     Ok(grown)
 }
 
-/// A law where it explains most of what a set leaves, if that is worth refining.
-fn at_best_start<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Option<Child<'s>> {
+/// A law where it explains most of what a set leaves, if that is worth refining; a ripple of few periods beside a fine one.
+fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Vec<Child<'s>> {
     let Search { bench, approach, shelf, .. } = search;
     let shelved = || shelf.get(&law.cause).map_or(&[][..], Vec::as_slice);
     let fresh: Vec<Part>;
     let parts: &[Part] = if Approach::suits(law) {
-        fresh = bench.parts(law, vec![approach.from(shelved(), set)?]);
+        fresh = bench.parts(law, approach.from(shelved(), set).into_iter().collect());
         &fresh
     } else if law.starts_from_rest {
         fresh = bench.parts(law, bench.starts(law, set));
@@ -239,9 +243,15 @@ fn at_best_start<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Option
         shelved()
     };
     let figure_with = |part: &Part| figure(&bench.joined(set, part)) + NUMBER_PRICE * part.shape.len() as f64;
-    let (figure, part) = parts.iter().map(|part| (figure_with(part), part)).min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let worth = figure < set.figure() - LEAST_AT_START;
-    worth.then(|| Child { set, part: part.clone(), price: price(set) + figure - set.figure() })
+    let best = |few: bool| {
+        let alike = parts.iter().filter(|part| few_periods(part) == few);
+        let (figure, part) = alike.map(|part| (figure_with(part), part)).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let worth = figure < set.figure() - if few { LEAST_OF_FEW } else { LEAST_AT_START };
+        worth.then(|| Child { set, part: part.clone(), price: price(set) + figure - set.figure() })
+    };
+    // There is one ripple of few periods at most.
+    let has_few = set.parts.iter().any(|part| part.law.cause == law.cause && few_periods(part));
+    [best(false), if has_few { None } else { best(true) }].into_iter().flatten().collect()
 }
 
 fn may_join(set: &Fit, law: &Law) -> bool {
@@ -255,7 +265,12 @@ fn may_join(set: &Fit, law: &Law) -> bool {
 }
 
 fn is_physical(bench: &Bench, fit: &Fit) -> bool {
-    fit.parts.iter().zip(&fit.coefficients).all(|(p, c)| (p.law.effect)(bench.frame, &p.shape, c).is_some())
+    let few = fit.parts.iter().filter(|p| few_periods(p)).map(|p| p.law.cause);
+    let mut few: Vec<Cause> = few.collect();
+    few.sort();
+    let one_of_each = few.windows(2).all(|pair| pair[0] != pair[1]);
+    one_of_each
+        && fit.parts.iter().zip(&fit.coefficients).all(|(p, c)| (p.law.effect)(bench.frame, &p.shape, c).is_some())
 }
 
 /// Drops causes that the others do without as they are, weakest first: refined, the others would do without them all the more.
@@ -290,7 +305,7 @@ fn shrink(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
         };
         let needed = price(&without[weakest]) - price(&fit) >= LEAST_GAIN && borne_out(bench, &without[weakest], &fit);
         let dropped = if needed {
-            slight(bench, &without, &fit).or_else(|| doubtful(bench, &without, &fit))
+            slight(bench, &without, &fit).or_else(|| doubtful(bench, &without, &fit)).or_else(|| once_only(bench, &fit))
         } else {
             Some(weakest)
         };
@@ -325,6 +340,22 @@ fn doubtful(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
     let open = (0..strengths.len()).filter(|&i| !fit.halves(&without[i]));
     let weakest = open.min_by(|&a, &b| strengths[a].total_cmp(&strengths[b]))?;
     (strengths[weakest] < LEAST_STRENGTH).then_some(weakest)
+}
+
+/// Whether a part is a ripple of few periods along the stroke.
+fn few_periods(part: &Part) -> bool {
+    let along_stroke = [Cause::Cogging, Cause::ScrewPeriodicError].contains(&part.law.cause);
+    along_stroke && part.shape.first().is_some_and(|periods| *periods < FEW)
+}
+
+/// A ripple of few periods that is not there in each of them.
+fn once_only(bench: &Bench, fit: &Fit) -> Option<usize> {
+    (0..fit.parts.len()).find(|&i| {
+        let Part { law, shape, .. } = &fit.parts[i];
+        let channel = if law.cause == Cause::Cogging { 0..bench.rows } else { bench.rows..fit.residual.len() };
+        few_periods(&fit.parts[i])
+            && !is_in_each_period(bench.frame, shape[0], &fit.contribution(i)[channel.clone()], &fit.residual[channel])
+    })
 }
 
 /// Whether held-out blocks bear out what `full` gains over `less`.

@@ -76,10 +76,8 @@ pub fn views(bench: &Bench, before: &Fit, after: &Fit) -> Vec<View> {
     let [before, _] = bench.rest(before);
     let [after, _] = bench.rest(after);
     let frame = bench.frame;
-    let rows = &frame.kept;
-    let since = since_reversal(frame);
-    let grouped = |coordinate: Coordinate, at: &dyn Fn(usize) -> f64| {
-        let places: Vec<f64> = (0..rows.len()).map(at).collect();
+    let grouped = |coordinate: Coordinate| {
+        let places = places(frame, coordinate);
         let (a, b) = (Groups::of(&places, &before), Groups::of(&places, &after));
         let value = |at: f64| if coordinate == Coordinate::SinceReversal { at.exp() } else { at };
         let curve = a.means().zip(b.means()).map(|((at, a), (_, b))| (value(at), a, b)).collect();
@@ -88,19 +86,38 @@ pub fn views(bench: &Bench, before: &Fit, after: &Fit) -> Vec<View> {
     COORDINATES
         .into_iter()
         .map(|coordinate| match coordinate {
-            Coordinate::Position => grouped(coordinate, &|k| frame.x[rows[k]]),
-            Coordinate::Velocity => grouped(coordinate, &|k| frame.v[rows[k]]),
-            Coordinate::Direction => grouped(coordinate, &|k| frame.v[rows[k]].signum()),
-            Coordinate::Acceleration => grouped(coordinate, &|k| frame.acceleration[k] / frame.unit),
-            Coordinate::Time => grouped(coordinate, &|k| frame.seconds(rows[k])),
-            Coordinate::SinceReversal => grouped(coordinate, &|k| since[rows[k]].max(1e-9).ln()),
             Coordinate::Frequency => {
                 let (a, b) = (periods::spectrum(frame, &before), periods::spectrum(frame, &after));
                 let curve = a.iter().zip(&b).map(|(a, b)| (a.0, a.1, b.1)).collect();
                 View { coordinate, before: lines(&a, &before), after: lines(&b, &after), curve }
             }
+            _ => grouped(coordinate),
         })
         .collect()
+}
+
+/// Share of the variance of a fit's torque residual that goes with a coordinate other than frequency, 0 to 1.
+#[must_use]
+pub fn share_along(bench: &Bench, fit: &Fit, coordinate: Coordinate) -> f64 {
+    let [rest, _] = bench.rest(fit);
+    Groups::of(&places(bench.frame, coordinate), &rest).share()
+}
+
+/// Where the judged rows are along a coordinate: distance since reversal by its logarithm, frequency nowhere.
+fn places(frame: &Frame, coordinate: Coordinate) -> Vec<f64> {
+    let at = |value: &dyn Fn(usize) -> f64| frame.kept.iter().map(|&row| value(row)).collect();
+    match coordinate {
+        Coordinate::Position => at(&|row| frame.x[row]),
+        Coordinate::Velocity => at(&|row| frame.v[row]),
+        Coordinate::Direction => at(&|row| frame.v[row].signum()),
+        Coordinate::Acceleration => at(&|row| frame.a[row]),
+        Coordinate::Time => at(&|row| frame.seconds(row)),
+        Coordinate::SinceReversal => {
+            let since = since_reversal(frame);
+            at(&|row| since[row].max(1e-9).ln())
+        }
+        Coordinate::Frequency => Vec::new(),
+    }
 }
 
 /// What is left, in a few words; `excess` is the variance above the noise floor, in units of the floor's.

@@ -119,8 +119,11 @@ impl Effect {
                 (1.0 / fastest.powi(2), 1.0 / 15f64.powi(2), 1.0)
             }
             "cogging" => {
+                // In one of four few periods: a screw, a gear or a table that runs out of true.
+                let few = r.chance(0.25);
                 form = [
                     match rig.drive {
+                        _ if few => stroke / r.uniform(1.8, 5.0),
                         Drive::BallScrew => {
                             let n = r.pick(&[1, rig.pole_pairs, 2 * rig.pole_pairs, 6 * rig.pole_pairs]);
                             (rig.gearing / f64::from(n)).max(0.4)

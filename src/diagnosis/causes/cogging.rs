@@ -6,7 +6,7 @@ use super::*;
 /// Parameter: periods over the stroke of this recording. Coefficients: sine and cosine.
 pub static LAW: Law = Law {
     cause: Cause::Cogging,
-    scales: &[Scale::Linear(1.5, 1e6, 0.02)],
+    scales: &[Scale::Linear(1.0, 1e6, 0.02)],
     starts: |frame, rest| periods::along_stroke(frame, rest.torque),
     starts_from_rest: true,
     simulated: false,
@@ -20,6 +20,9 @@ pub static LAW: Law = Law {
     effect: |frame, shape, c| {
         let [sine, cosine] = c.try_into().ok()?;
         let (low, high) = frame.stroke();
+        if *shape.first()? <= periods::WHOLE {
+            return None;
+        }
         Some(Effect::Cogging { amplitude: f64::hypot(sine, cosine), period_mm: (high - low) / shape.first()? })
     },
     confused_with: &[Cause::ExternalVibration, Cause::PositionDependentFriction],

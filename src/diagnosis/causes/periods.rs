@@ -1,6 +1,7 @@
 //! Where a rest repeats: along the stroke or in time, by matched filters over all periods at once (a Fourier transform).
 
 use super::*;
+use crate::machine::Drive;
 use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
 
@@ -11,6 +12,14 @@ const MOST: usize = 2;
 /// Least share of the rest's squares that a peak explains by its height. A cause needs eight times as much to be named, and
 /// the raster of bins and frequencies costs a peak a quarter at most.
 const LEAST_SHARE: f64 = 0.01;
+
+/// Fewest periods over the stroke from which a ripple is looked for.
+const LEAST_PERIODS: f64 = 1.5;
+/// Fewest at which it is found: of less than a whole period nobody knows that it repeats.
+pub const WHOLE: f64 = 1.1;
+/// Periods below which they are few: each of them is looked at, and there is one such ripple at most, since two and a slope are
+/// a Fourier series that imitates anything along the stroke.
+pub const FEW: f64 = 6.0;
 
 /// Sine and cosine with this many periods over the stroke, every row.
 pub fn waves(frame: &Frame, periods: f64) -> (Vec<f64>, Vec<f64>) {
@@ -53,15 +62,41 @@ pub fn along_stroke(frame: &Frame, rest: &[f64]) -> Vec<Vec<f64>> {
         }
     }
     // Two transform lengths over the stroke: half periods are resolved. Periods below eight bins or eight encoder steps,
-    // and fewer than five over the stroke, are not looked for.
+    // and fewer than LEAST_PERIODS over the stroke, are not looked for.
     let most = (STROKE_BINS / 8).min((stroke / (8.0 * frame.grid.max(1e-9))) as usize);
-    let mut starts = peaks(&mut bins, (10, 2 * most), 0.5, least_power(rest));
-    if let crate::machine::Drive::BallScrew { lead_mm } = frame.axis.drive {
-        let poles = f64::from(frame.axis.motor_pole_pairs.unwrap_or(4));
-        let likely = [1.0, 2.0, poles, 2.0 * poles, 6.0 * poles].map(|n| n * stroke / lead_mm);
-        starts.extend(likely.into_iter().filter(|n| *n >= 1.5 && *n < most as f64).map(|n| vec![n]));
-    }
+    let mut starts = peaks(&mut bins, ((2.0 * LEAST_PERIODS) as usize, 2 * most), 0.5, least_power(rest));
+    let (turns, table) = match frame.axis.drive {
+        Drive::BallScrew { lead_mm } => (stroke / lead_mm, 0.0),
+        Drive::Rotary { ratio } => (stroke / 360.0 * ratio, stroke / 360.0),
+        Drive::Linear => (0.0, 0.0),
+    };
+    let poles = f64::from(frame.axis.motor_pole_pairs.unwrap_or(4));
+    let likely = [1.0, 2.0, poles, 2.0 * poles, 6.0 * poles].map(|n| n * turns);
+    let likely = likely.into_iter().chain([table]).filter(|n| *n >= LEAST_PERIODS && *n < most as f64);
+    starts.extend(likely.map(|n| vec![n]));
     starts
+}
+
+/// Whether a ripple of few periods over the stroke is there in each of them (in each half of the stroke at least): at least half as large as on the whole, and half as
+/// much again at most. `ripple` and `left` are what it explains and what is left, at the judged rows. What happens once, as a
+/// detent, is explained by a wave of few periods as well, and is not there elsewhere.
+pub fn is_in_each_period(frame: &Frame, periods: f64, ripple: &[f64], left: &[f64]) -> bool {
+    let count = periods.floor().clamp(2.0, FEW);
+    let (low, high) = frame.stroke();
+    let mut sums = [[0.0f64; 3]; FEW as usize];
+    for ((&row, ripple), left) in frame.kept.iter().zip(ripple).zip(left) {
+        let place = (count * (frame.x[row] - low) / (high - low)) as usize;
+        if let Some([own, with, noise]) = sums.get_mut(place.min(count as usize - 1)) {
+            *own += ripple * ripple;
+            *with += ripple * left;
+            *noise += (ripple * left).powi(2);
+        }
+    }
+    let whole: f64 = sums.iter().map(|s| s[0]).sum();
+    sums.iter().filter(|s| s[0] > 0.02 * whole).all(|[own, with, noise]| {
+        // Neighbouring rows are not independent: three deviations of independent ones.
+        with.abs() < 0.5 * own + 3.0 * noise.sqrt()
+    })
 }
 
 /// Numbers of periods over the recording at which the rest repeats most.

@@ -5,7 +5,7 @@ use super::*;
 /// Parameter: periods over the stroke. Coefficients: sine and cosine, load units.
 pub static LAW: Law = Law {
     cause: Cause::ScrewPeriodicError,
-    scales: &[Scale::Linear(1.5, 1e6, 0.02)],
+    scales: &[Scale::Linear(1.0, 1e6, 0.02)],
     starts: |frame, rest| if rest.table.is_empty() { Vec::new() } else { periods::along_stroke(frame, rest.table) },
     starts_from_rest: true,
     simulated: false,
@@ -19,6 +19,9 @@ pub static LAW: Law = Law {
     effect: |frame, shape, c| {
         let [sine, cosine] = c.try_into().ok()?;
         let (low, high) = frame.stroke();
+        if *shape.first()? <= periods::WHOLE {
+            return None;
+        }
         let amplitude_um = 1e3 * f64::hypot(sine, cosine);
         Some(Effect::ScrewPeriodicError { amplitude_um, period_mm: (high - low) / shape.first()? })
     },
