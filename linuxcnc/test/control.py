@@ -47,7 +47,8 @@ def state():
 
 
 def idle():
-    return state().interp_state == linuxcnc.INTERP_IDLE and stat.exec_state == linuxcnc.EXEC_DONE
+    return (state().interp_state == linuxcnc.INTERP_IDLE and stat.exec_state == linuxcnc.EXEC_DONE
+            and stat.state != linuxcnc.RCS_EXEC)
 
 
 def mdi(line, seconds=60):
