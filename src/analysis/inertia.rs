@@ -63,6 +63,23 @@ pub struct Found {
     pub torque_column: String,
 }
 
+impl Found {
+    /// Whether saturation cannot be excluded: a motor that delivers less than its current says takes up T = J·a + s·sign a + …
+    /// beyond a limit, and where |a| is one number, s·sign a is (s/|a|)·a, an inertia. Ramps whose accelerations differ by half
+    /// tell them apart.
+    #[must_use]
+    pub fn one_acceleration(&self) -> bool {
+        const DIFFERENT: f64 = 1.5;
+        const CLEAR: f64 = 0.3; // of the largest: below, it is a hold or a corner
+        let mut ramps: Vec<f64> = self.blocks.iter().map(|block| block.acceleration.abs()).collect();
+        ramps.sort_by(f64::total_cmp);
+        let at = |seen: &[f64], share: f64| seen.get((share * seen.len() as f64) as usize).copied().unwrap_or(0.0);
+        let clear = CLEAR * at(&ramps, 0.98);
+        ramps.retain(|acceleration| *acceleration > clear);
+        at(&ramps, 0.9) < DIFFERENT * at(&ramps, 0.1)
+    }
+}
+
 /// Why an inertia cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Refusal(pub Fault);
@@ -263,6 +280,42 @@ mod tests {
         assert!(error.contains("spindle.torque_nm"), "{error}");
         let options = Options { torque_constant: Some(-1.0), ..Options::default() };
         assert!(measure(&recording, &options).unwrap_err().to_string().contains("torque constant"));
+    }
+
+    /// A motor that reports more torque than it delivers beyond 15 N·m reads as another inertia at one acceleration, and is said
+    /// to be possible; a second acceleration finds it out.
+    #[test]
+    fn one_acceleration_cannot_exclude_saturation() {
+        let saturated = |gentle: f64| {
+            let (mut omega, mut columns) = (0.0f64, [vec![], vec![], vec![]]);
+            for i in 0..24_000 {
+                let t = f64::from(i) * 1e-3;
+                let scale = if t < 12.0 { 1.0 } else { gentle };
+                let acceleration = scale
+                    * if t % 6.0 < 2.0 {
+                        60.0
+                    } else if (3.0..5.0).contains(&(t % 6.0)) {
+                        -60.0
+                    } else {
+                        0.0
+                    };
+                let torque = if omega > 0.0 { 0.4 * acceleration + 3.0 + 0.02 * omega } else { 0.0 };
+                let beyond = (torque.abs() - 15.0).max(0.0).copysign(torque);
+                let noise = 0.3 * (f64::from(i) * 2.39).sin();
+                let row = [t, rpm_from_rad_s(omega), torque + beyond + noise];
+                columns.iter_mut().zip(row).for_each(|(column, value)| column.push(value));
+                omega = (omega + acceleration * 1e-3).max(0.0);
+            }
+            let [times, speeds, torques] = columns;
+            let columns = vec![Column::new("spindle.speed_rpm", speeds), Column::new("spindle.torque_nm", torques)];
+            measure(&Recording::from_columns("test", times, columns).unwrap(), &Options::default()).unwrap()
+        };
+        let (one, two) = (saturated(1.0), saturated(0.4));
+        println!("{:.3} of 0.4 at one acceleration, {:.3} at two", one.report.total_kg_m2, two.report.total_kg_m2);
+        assert!(one.one_acceleration() && !two.one_acceleration());
+        assert!((one.report.total_kg_m2 / 0.4 - 1.0).abs() > 0.05, "{:?}", one.report);
+        assert!(two.report.saturation_nm > 0.0 || two.refused.is_some(), "{:?}", two.report);
+        assert!(two.refused.is_some() || (two.report.total_kg_m2 / 0.4 - 1.0).abs() < 0.02, "{:?}", two.report);
     }
 
     /// A sign that is turned round is told, not averaged away.
