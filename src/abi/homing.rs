@@ -12,6 +12,8 @@ use core::ffi::c_void;
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
 const ALIVE: u32 = 0x6769_6821;
+/// The same for an instance at work on two motors.
+const BOTH: u32 = 0x6769_6823;
 /// The same for an instance that has nothing to do but to follow the axis.
 const QUIET: u32 = 0x6769_6822;
 
@@ -25,7 +27,7 @@ pub struct GibHoming {
 
 impl Instance for GibHoming {
     fn alive(&self) -> bool {
-        self.alive == ALIVE || self.alive == QUIET
+        [ALIVE, BOTH, QUIET].contains(&self.alive)
     }
     fn new() -> GibHoming {
         GibHoming { alive: QUIET, last: Fault::NONE, machine: Homing::default() }
@@ -39,7 +41,11 @@ impl GibHoming {
     /// Renews the mark after the machine may have changed.
     #[inline(always)]
     fn mark(&mut self) {
-        self.alive = if self.machine.quiet() { QUIET } else { ALIVE };
+        self.alive = match () {
+            () if self.machine.quiet() => QUIET,
+            () if self.machine.gantry() => BOTH,
+            () => ALIVE,
+        };
     }
 }
 
@@ -170,11 +176,18 @@ pub unsafe extern "C" fn gib_homing_step(
     let (handle, input, output) = unsafe { (&mut *handle, &*input, &mut *output) };
     // The cheap cycles, in which an axis spends its life.
     if handle.alive != ALIVE {
+        if handle.alive != QUIET {
+            return if handle.alive == BOTH {
+                step_both(handle, input, output)
+            } else {
+                step_from_rest(handle, input, output)
+            };
+        }
         let place = input.position_mm;
         let sum = place[0] + place[1];
         #[expect(clippy::eq_op, reason = "NaN for NaN and infinity, in the fewest instructions")]
         let odd = (sum - sum).is_nan();
-        if handle.alive != QUIET || odd {
+        if odd {
             return step_from_rest(handle, input, output);
         }
         *output = *handle.machine.output();
@@ -188,12 +201,38 @@ pub unsafe extern "C" fn gib_homing_step(
     output.status
 }
 
+/// A cycle at work on two motors. `extern "C"` as below.
+#[inline(never)]
+extern "C" fn step_both(handle: &mut GibHoming, input: &HomingInput, output: &mut HomingOutput) -> i32 {
+    if !handle.machine.quick_both(input, output) {
+        return both_unlike(handle, input, output);
+    }
+    output.status
+}
+
+/// One that is not like the one before.
+#[inline(never)]
+extern "C" fn both_unlike(handle: &mut GibHoming, input: &HomingInput, output: &mut HomingOutput) -> i32 {
+    if !handle.machine.quick_both_slow(input, output) {
+        return step_whole(handle, input, output);
+    }
+    output.status
+}
+
+/// A cycle of which nothing is usual.
+#[inline(never)]
+extern "C" fn step_whole(handle: &mut GibHoming, input: &HomingInput, output: &mut HomingOutput) -> i32 {
+    handle.machine.step(input);
+    handle.mark();
+    *output = *handle.machine.output();
+    output.status
+}
+
 /// A cycle at work that is not like the one before. `extern "C"`: it cannot unwind, so that it is called by a jump.
 #[inline(never)]
 extern "C" fn step_unlike(handle: &mut GibHoming, input: &HomingInput, output: &mut HomingOutput) -> i32 {
     if !handle.machine.quick_slow(input) {
-        handle.machine.step(input);
-        handle.mark();
+        return step_whole(handle, input, output);
     }
     *output = *handle.machine.output();
     output.status
@@ -205,10 +244,7 @@ extern "C" fn step_from_rest(handle: &mut GibHoming, input: &HomingInput, output
     if !handle.alive() {
         return misused(Some(handle), Some(input), Some(output));
     }
-    handle.machine.step(input);
-    handle.mark();
-    *output = *handle.machine.output();
-    output.status
+    step_whole(handle, input, output)
 }
 
 /// A step without an instance, an input or an output: nothing moves, and the position asked for is the present one.

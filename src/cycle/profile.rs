@@ -46,6 +46,13 @@ impl Profile {
         self.goal = self.position;
     }
 
+    /// Where the present move ends, mm.
+    #[inline(always)]
+    #[must_use]
+    pub fn goal(&self) -> f64 {
+        self.goal
+    }
+
     /// Way left to the goal, mm, signed.
     #[inline(always)]
     #[must_use]

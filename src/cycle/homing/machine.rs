@@ -18,6 +18,9 @@ use crate::cycle::backlash::io::GIB_INPUT_ABORT;
 use crate::error::*;
 
 mod gantry;
+mod quick;
+#[cfg(test)]
+mod quick_tests;
 mod sequence;
 
 /// Where the machine is. Each comment says what ends the state.
@@ -60,8 +63,9 @@ enum Phase {
 pub struct Homing {
     plan: Plan,
     phase: Phase,
-    /// One motor moves or presses and nothing else is to be done: most cycles are like the one before.
+    /// All that is to be done is to move or to press: most cycles are like the one before.
     quick: bool,
+    usual: quick::Usual,
     /// First fault of this run.
     fault: Fault,
     /// What the evaluation of the touch found wrong.
@@ -94,6 +98,7 @@ impl Default for Homing {
             plan: Plan::REST,
             phase: Phase::Idle,
             quick: false,
+            usual: quick::Usual::default(),
             fault: Fault::NONE,
             suspect: Fault::NONE,
             now: 0,
@@ -170,7 +175,14 @@ impl Homing {
     /// Cycles since the start.
     #[inline(always)]
     fn cycles(&self) -> u32 {
-        self.now.saturating_add(self.sides[0].quick_cycles())
+        self.now.saturating_add(self.usual.gone()).saturating_add(self.sides[0].quick_cycles())
+    }
+
+    /// Whether both motors of a gantry are to be stepped.
+    #[inline(always)]
+    #[must_use]
+    pub fn gantry(&self) -> bool {
+        self.plan.motors == 2
     }
 
     /// True when a step does nothing but follow the axis: nothing is under way, owed or news.
@@ -200,7 +212,7 @@ impl Homing {
         }
     }
 
-    /// One servo cycle if it is like the one before, which most are; when it is not, [`Homing::quick_slow`] must follow.
+    /// One servo cycle of a single motor if it is like the one before, which most are; when it is not, [`Homing::quick_slow`] must follow.
     #[inline(always)]
     pub fn quick(&mut self, input: &HomingInput) -> bool {
         let [side, _] = &mut self.sides;
@@ -225,13 +237,16 @@ impl Homing {
 
     /// One servo cycle that is neither [`Homing::quick`] nor [`Homing::quick_slow`].
     pub fn step(&mut self, input: &HomingInput) {
-        self.now = self.cycles();
-        self.sides[0].look_no_further();
+        let (was_quick, caught_up) = (self.quick, self.end_usual());
         self.output.new_events = 0;
         match self.phase {
             Phase::Idle | Phase::Done | Phase::Failed => self.rest(input),
             Phase::Stopping | Phase::Unload | Phase::Relieve | Phase::Restore => self.exit(input),
             _ => self.work(input),
+        }
+        // Not in a cycle that has much to do anyway.
+        if was_quick && self.quick && self.output.new_events == 0 && !caught_up {
+            self.see_usual(self.deadline.saturating_sub(self.now + 2));
         }
     }
 
@@ -265,10 +280,6 @@ impl Homing {
                 side.sense(&self.plan, input.position_mm[i], input.torque[i]);
             }
             if self.phase == Phase::Touch { self.touch() } else { self.advance(input) }
-        }
-        if self.quick && self.output.new_events == 0 {
-            let left = self.deadline.saturating_sub(self.now + 2);
-            self.sides[0].look_ahead(&self.plan, left);
         }
         self.command();
     }

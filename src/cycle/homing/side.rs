@@ -8,13 +8,17 @@ use super::trace::Trace;
 use crate::cycle::profile::{Profile, higher, lower};
 use crate::error::*;
 
+mod ahead;
 mod blame;
 mod quick;
+
+pub use ahead::{Ahead, Caught};
+pub use blame::{RIGID, RIGID_AFTER_TURN, UNDER_WAY};
 
 /// Share of a new sample in the filtered torque: eight cycles.
 pub const GAIN: f64 = 0.125;
 /// The same for how much its changes differ.
-const ROUGH_GAIN: f64 = 1.0 / 16.0;
+pub const ROUGH_GAIN: f64 = 1.0 / 16.0;
 /// Share of the limit at which the torque counts as off, and how steeply the command answers to more.
 const RELIEVED: f64 = 0.2;
 /// Share of the torque at which it counts as limiting that is too much to be left on.
@@ -56,35 +60,35 @@ pub struct Side {
     /// Where the present touch began, mm.
     pub origin: f64,
     /// Where the present move began, mm.
-    from: f64,
+    pub(super) from: f64,
     /// Last measured position, mm.
     pub position: f64,
     /// Torque toward the stop, filtered.
     pub filtered: f64,
     /// Lowest of it on the way back, and the last while it slid back steadily.
-    lowest: f64,
-    sliding: f64,
+    pub(super) lowest: f64,
+    pub(super) sliding: f64,
     /// The torque as it was read last, for how many cycles, where the axis was when it last changed, its last change and
     /// the mean of how much that differs from the one before.
-    reading: f64,
-    same: u32,
-    changed_at: f64,
-    change: f64,
-    rough: f64,
+    pub(super) reading: f64,
+    pub(super) same: u32,
+    pub(super) changed_at: f64,
+    pub(super) change: f64,
+    pub(super) rough: f64,
     /// Cycles since the position changed, how many are too many, and the torque when it last changed.
-    frozen: u32,
-    frozen_limit: u32,
-    free: [f64; 2],
+    pub(super) frozen: u32,
+    pub(super) frozen_limit: u32,
+    pub(super) free: [f64; 2],
     /// Torque at which `held` changes.
     trip: f64,
-    held: bool,
+    pub(super) held: bool,
     /// The torque was at the limit before the touch had begun.
     loaded: bool,
     /// It was moving when it began to brake on the way out.
     moving: bool,
     /// Something was pressed on and has not been left since.
     pressing: bool,
-    anchor: f64,
+    pub(super) anchor: f64,
     standing: u32,
     /// Torque against way of the present touch.
     pub trace: Trace,
@@ -203,7 +207,9 @@ impl Side {
             self.anchor = self.position;
             self.standing = 0;
         }
-        if self.standing < plan.hold {
+        // Under its limit an encoder may stand.
+        self.frozen = 0;
+        if self.goes_on(plan) {
             self.profile.step();
         } else {
             self.profile.speed = 0.0;

@@ -72,11 +72,23 @@ impl Trace {
         self.torque = 0.0;
     }
 
+    /// Whether nothing is kept now.
+    #[must_use]
+    pub fn paused(&self) -> bool {
+        self.full == PAUSED
+    }
+
+    /// Whether every cycle is a block here and there, of the same place.
+    #[must_use]
+    pub fn even_with(&self, other: &Trace) -> bool {
+        self.full == 1 && other.full == 1 && self.written == other.written
+    }
+
     /// Adds the position (mm) and torque of a cycle, as they were read; false when paused.
     #[inline(always)]
     pub fn add(&mut self, position: f64, torque: f64) -> bool {
         if self.full == 1 {
-            self.put(position, torque);
+            self.put([position, torque]);
             return true;
         }
         if self.full == PAUSED {
@@ -86,7 +98,7 @@ impl Trace {
         self.torque += torque;
         self.in_block += 1;
         if self.in_block >= self.full {
-            self.put(self.position * self.share, self.torque * self.share);
+            self.put([self.position * self.share, self.torque * self.share]);
             self.in_block = 0;
             self.position = 0.0;
             self.torque = 0.0;
@@ -94,9 +106,18 @@ impl Trace {
         true
     }
 
+    /// Adds a block of one cycle's position (mm) and torque, as they were read; its place.
     #[inline(always)]
-    fn put(&mut self, position: f64, torque: f64) {
-        self.blocks[self.written as usize & (BLOCKS - 1)] = [position, torque];
+    pub fn put(&mut self, block: [f64; 2]) -> usize {
+        let place = self.written as usize & (BLOCKS - 1);
+        self.put_at(place, block);
+        place
+    }
+
+    /// Adds a block whose place is known.
+    #[inline(always)]
+    pub fn put_at(&mut self, place: usize, block: [f64; 2]) {
+        self.blocks[place & (BLOCKS - 1)] = block;
         self.written = self.written.wrapping_add(1);
     }
 

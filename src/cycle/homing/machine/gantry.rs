@@ -20,7 +20,7 @@ impl Homing {
 
     /// How far apart the two sides have gone since the start.
     #[inline(always)]
-    fn apart(&self) -> f64 {
+    pub(super) fn apart(&self) -> f64 {
         self.sides[0].travel(&self.plan) - self.sides[1].travel(&self.plan)
     }
 

@@ -358,8 +358,7 @@ impl Homing {
         if matches!(self.phase, Phase::Stopping | Phase::Unload | Phase::Relieve | Phase::Restore) {
             return; // on the way out already
         }
-        self.now = self.cycles(); // an abort comes between two cycles
-        self.sides[0].look_no_further();
+        self.end_usual(); // an abort comes between two cycles
         self.fault = fault;
         self.output.message = fault.code;
         if blind {
@@ -444,7 +443,7 @@ impl Homing {
     /// Goes to a state that must end within `cycles`, and within the time limit unless it is on the way out.
     pub(super) fn enter(&mut self, phase: Phase, cycles: f64) {
         self.phase = phase;
-        self.quick = self.plan.motors == 1 && matches!(phase, Phase::Touch | Phase::Retract | Phase::Offset);
+        self.quick = matches!(phase, Phase::Touch | Phase::Retract | Phase::Offset);
         let out = matches!(phase, Phase::Stopping | Phase::Unload | Phase::Relieve | Phase::Restore);
         let last = if out { u32::MAX } else { self.end };
         self.deadline = self.now.saturating_add((cycles + 1.0) as u32).min(last);

@@ -8,9 +8,10 @@ use super::*;
 /// Change of torque, as a share of the limit, that no standing encoder explains: a stop gives way by some counts of
 /// the encoder. After a turn, friction on the motor's side may hold the motor while its torque changes sense.
 pub const RIGID: f64 = 0.3;
-const RIGID_AFTER_TURN: f64 = 0.8;
+/// The same after a turn.
+pub const RIGID_AFTER_TURN: f64 = 0.8;
 /// Share of the retraction after which a turn is over.
-const UNDER_WAY: f64 = 0.04;
+pub const UNDER_WAY: f64 = 0.04;
 /// Share of the limit beyond which a torque that changes to its opposite while the encoder stands has changed its sign.
 const FLIPPED: f64 = 0.2;
 /// Share of a reading's noise that is left in the filtered torque: √(GAIN/(2 − GAIN)).
@@ -120,7 +121,8 @@ impl Side {
     #[must_use]
     pub fn rigid(&self, plan: &Plan) -> bool {
         let under_way = (self.position - self.from).abs() > UNDER_WAY * plan.retract;
-        let never_moved = self.position == self.origin && self.filtered >= plan.threshold;
+        let touches = self.from == self.origin;
+        let never_moved = touches && self.position == self.origin && self.filtered >= plan.threshold;
         let share = if under_way { RIGID } else { RIGID_AFTER_TURN };
         let most = share * plan.limit;
         let changed = (self.reading - self.free[0]).abs() > most && (self.filtered - self.free[1]).abs() > 0.5 * most;

@@ -1,5 +1,5 @@
-//! The cycles of a motor that are like the one before, in a few instructions. Which may come is looked ahead to in the
-//! steps between.
+//! The cycles of a single motor that are like the one before, in a few instructions. Which may come is looked ahead to in the
+//! steps between. Those of a gantry are in `machine/quick.rs`: lanes cost one motor more than they save.
 
 use super::blame::RIGID;
 use super::*;
@@ -97,14 +97,14 @@ impl Side {
         }
     }
 
-    /// Cycles that went by in [`Side::quick`] and [`Side::quick_slow`] since the last [`Side::look_ahead`].
+    /// Cycles that went by in [`Side::quick`] and [`Side::quick_slow`] since the last [`Side::grant`].
     #[inline(always)]
     #[must_use]
     pub fn quick_cycles(&self) -> u32 {
         self.granted - self.cruise as u32 - self.slow
     }
 
-    /// Ends what [`Side::look_ahead`] has granted.
+    /// Ends what [`Side::grant`] has granted.
     #[inline(always)]
     pub fn look_no_further(&mut self) {
         let gone = self.quick_cycles();
@@ -119,7 +119,7 @@ impl Side {
     /// Counts the cycles for which [`Side::quick`] or [`Side::quick_slow`] may go on, at most `left`; after a cycle's
     /// step of the command. The last of a move is left to the other steps.
     #[inline(always)]
-    pub fn look_ahead(&mut self, plan: &Plan, left: u32) {
+    pub fn grant(&mut self, plan: &Plan, left: u32) {
         let p = &self.profile;
         let (way, speed) = (p.left().abs(), p.speed_max());
         if p.cruises() && !self.held && self.frozen == 0 {
@@ -137,7 +137,6 @@ impl Side {
         self.granted = ((way / speed - 4.0 - 2.0 * plan.acceleration / speed) as u32).min(left);
         if self.held {
             (self.low, self.high) = (plan.release, plan.bound);
-            self.frozen = 0;
             let next = if self.standing < plan.hold { plan.hold } else { plan.detection };
             self.granted = next.saturating_sub(self.standing + 1).min(left);
         } else if self.frozen > 0 {

@@ -1,0 +1,441 @@
+//! The usual cycles of a gantry, which are like the one before: nothing begins, ends, breaks a bound or is news. Both motors at
+//! once, one a lane. Those of a single motor are in `side/quick.rs`.
+//!
+//! They do what [`Homing::step`] would do and keep every check of [`Side::safe`]. A cycle that breaks a bound is left to that
+//! step, before anything is changed. Most cycles are at constant speed ([`Homing::quick_both`]), where ways and times cannot end and
+//! a lag that stays in its band is within all bounds. In the others a command speeds up or brakes, a motor sticks, or stands
+//! pressed ([`Homing::quick_both_slow`]).
+
+use super::*;
+use crate::cycle::homing::side::{Caught, GAIN, RIGID, RIGID_AFTER_TURN, ROUGH_GAIN, UNDER_WAY};
+use wide::f64x2;
+
+/// What usual cycles need of the motors, one a lane, lent by the sides.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Usual {
+    /// Cycles that may still be at constant speed, and after these; of how many.
+    cruise: i32,
+    slow: u32,
+    granted: u32,
+    /// Whether some were at constant speed.
+    cruises: bool,
+    /// Every motor stands pressed and its command has ended.
+    stands: bool,
+    /// Every cycle is a block of the traces, of the same place where there are two; none are kept.
+    even: bool,
+    paused: bool,
+    /// Speed of the command, which is in the output.
+    speed: f64x2,
+    /// Last readings.
+    position: f64x2,
+    reading: f64x2,
+    /// Filtered torque less the middle of its band, the lowest of it, and what a reading changes it by: `share`·torque − `drift`.
+    filtered: f64x2,
+    lowest: f64x2,
+    share: f64x2,
+    drift: f64x2,
+    middle: f64x2,
+    band: f64x2,
+    /// The lag about which cycles at constant speed count as usual, and by how much it may differ: between two such lags the
+    /// position changes by no more than a jump, nor goes beyond the end. Of motors that stand, how far from their anchors.
+    lag: f64x2,
+    lag_band: f64x2,
+    /// On the way back: the last of it at constant speed.
+    sliding: f64x2,
+    rest: Rest,
+}
+
+/// What cycles that are not at constant speed need beside that.
+#[derive(Debug, Clone, Copy, Default)]
+struct Rest {
+    /// All bits set for a motor that stands pressed, and for one whose command goes on.
+    held: f64x2,
+    goes: f64x2,
+    /// As in [`Plan`] and in [`Side`], its profile included.
+    lag_limit: f64x2,
+    jump: f64x2,
+    distance: f64x2,
+    acceleration: f64x2,
+    start: f64x2,
+    anchor: f64x2,
+    standing_way: f64x2,
+    goal: f64x2,
+    speed_max: f64x2,
+    braking: f64x2,
+    change: f64x2,
+    rough: f64x2,
+    rough_most: f64x2,
+    same: f64x2,
+    same_way: f64x2,
+    changed_at: f64x2,
+    /// What stood when the position changed last, and since when it does not.
+    free: f64x2,
+    free_reading: f64x2,
+    frozen: f64x2,
+    frozen_limit: f64x2,
+    /// Where the move began and the way on which it turns; change of the filtered torque meanwhile and after it that clears an
+    /// encoder that stands.
+    from: f64x2,
+    turn: f64x2,
+    turning: f64x2,
+    under_way: f64x2,
+    /// Change of lag at constant speed within which the position changes by no more than a jump.
+    half_jump: f64x2,
+    sense: f64x2,
+    /// Largest difference of the ways gone.
+    apart: f64,
+}
+
+fn lanes(of: impl FnMut(usize) -> f64) -> f64x2 {
+    f64x2::new(core::array::from_fn(of))
+}
+
+fn mask(mut of: impl FnMut(usize) -> bool) -> f64x2 {
+    lanes(|i| f64::from_bits(if of(i) { u64::MAX } else { 0 }))
+}
+
+/// Whether a limit is positive and finite, from the upper half of its bits: of all numbers, those have the lowest.
+#[inline(always)]
+fn sound(limit: f64) -> bool {
+    /// More than any limit. A half that does not end in zeros takes an instruction less.
+    const MOST: f64 = 1e300;
+    let upper = |number: f64| (number.to_bits() >> 32) as u32;
+    upper(limit) < upper(MOST)
+}
+
+impl Usual {
+    /// Cycles that went by since they were granted.
+    #[inline(always)]
+    pub fn gone(&self) -> u32 {
+        self.granted - self.cruise as u32 - self.slow
+    }
+
+    #[inline(always)]
+    fn filter(&self, torque: f64x2) -> f64x2 {
+        self.filtered * (1.0 - GAIN) + (self.share * torque - self.drift)
+    }
+
+    /// Takes a cycle's readings in. A trace is kept of touches, the lowest torque of the way back.
+    #[inline(always)]
+    fn take_in(&mut self, position: f64x2, torque: f64x2, filtered: f64x2, sides: &mut [Side; 2]) {
+        (self.position, self.reading, self.filtered) = (position, torque, filtered);
+        if self.even {
+            let [one, other] = f64x2::transpose([position, torque]);
+            let place = sides[0].trace.put(one.to_array());
+            sides[1].trace.put_at(place, other.to_array());
+        } else if self.paused {
+            self.lowest = filtered.fast_min(self.lowest);
+            self.sliding = filtered;
+        } else {
+            let [[p, q], [t, u]] = [position.to_array(), torque.to_array()];
+            sides[0].trace.add(p, t);
+            sides[1].trace.add(q, u);
+        }
+    }
+
+    /// Where the readings keep every bound.
+    #[inline(always)]
+    fn bounded(&self, position: f64x2, filtered: f64x2, target: f64x2) -> f64x2 {
+        let rest = &self.rest;
+        let way = (position - rest.start) * rest.sense;
+        let [first, second] = way.to_array();
+        // Of the way back `apart` bounds nothing.
+        let square = if (first - second).abs() > rest.apart { f64x2::ZERO } else { f64x2::ZERO.simd_eq(f64x2::ZERO) };
+        square
+            & (target - position).abs().simd_le(rest.lag_limit)
+            & (position - self.position).abs().simd_le(rest.jump)
+            & way.simd_le(rest.distance)
+            & filtered.abs().simd_le(self.band)
+    }
+
+    /// Where the encoder goes on, as in the cycle before.
+    #[inline(always)]
+    fn moves(&self, position: f64x2) -> f64x2 {
+        position.simd_ne(self.position) & self.rest.frozen.simd_eq(f64x2::ZERO)
+    }
+
+    /// For how many cycles encoders stand, and the filtered torque and the reading before, as in [`Side::sense`].
+    #[inline(always)]
+    fn standing(&self, position: f64x2) -> (f64x2, f64x2, f64x2) {
+        let rest = &self.rest;
+        let moved = rest.frozen.simd_eq(f64x2::ZERO);
+        let frozen = (rest.frozen + 1.0) & position.simd_eq(self.position) & !rest.held;
+        (frozen, moved.bitselect(self.filtered, rest.free), moved.bitselect(self.reading, rest.free_reading))
+    }
+
+    /// Where an encoder that stands is not at fault, as in [`Side::rigid`], and nothing ends a press.
+    #[inline(always)]
+    fn sane(&self, position: f64x2, torque: f64x2, filtered: f64x2, standing: &(f64x2, f64x2, f64x2)) -> f64x2 {
+        let (rest, (frozen, free, _)) = (&self.rest, *standing);
+        let most = (position - rest.from).abs().simd_gt(rest.turn).bitselect(rest.under_way, rest.turning);
+        let patient = frozen.simd_le(rest.frozen_limit) & (filtered - free).abs().simd_le(most);
+        (patient | frozen.simd_eq(f64x2::ZERO)) & (!rest.held | rest.presses(position, torque.simd_eq(self.reading)))
+    }
+
+    /// Puts the usual lags about this cycle's. While an encoder stands no lag is: that is not for [`Homing::quick_both`].
+    #[inline(always)]
+    fn centre(&mut self, lag: f64x2, position: f64x2) {
+        let rest = &self.rest;
+        let way = (position - rest.start) * rest.sense;
+        let [first, second] = way.to_array();
+        // At constant speed the sides go apart as far as both their lags change.
+        let room = 0.5 * (rest.apart - (first - second).abs());
+        let to_limit = (rest.lag_limit - lag.abs()).fast_min(rest.distance - way);
+        self.lag = lag;
+        self.lag_band =
+            to_limit.fast_min(rest.half_jump).fast_min(f64x2::splat(room)) | !rest.frozen.simd_eq(f64x2::ZERO);
+    }
+
+    /// All stand pressed: near their anchors, within the way of a standing axis, they are within all bounds.
+    fn stand(&mut self, target: f64x2) {
+        self.stands = true;
+        self.centre(target - self.rest.anchor, self.rest.anchor);
+        self.lag_band = self.lag_band.fast_min(self.rest.standing_way);
+    }
+
+    /// What has become of motor `i`, whose command is at `target`.
+    fn caught(&self, i: usize, target: f64) -> Caught {
+        let of = |lanes: f64x2| lanes.to_array()[i & 1];
+        Caught {
+            cycles: self.gone(),
+            cruises: self.cruises,
+            frozen: of(self.rest.frozen) as u32,
+            position: of(self.position),
+            reading: of(self.reading),
+            filtered: of(self.filtered + self.middle),
+            lowest: of(self.lowest + self.middle),
+            sliding: of(self.sliding + self.middle),
+            free: [of(self.rest.free_reading), of(self.rest.free + self.middle)],
+            change: of(self.rest.change),
+            rough: of(self.rest.rough),
+            same: of(self.rest.same) as u32,
+            changed_at: of(self.rest.changed_at),
+            target,
+            speed: of(self.speed),
+        }
+    }
+}
+
+impl Rest {
+    /// Whether a motor that is pressed stands, and not for long under the very same torque, as [`Side::press`].
+    #[inline(always)]
+    fn presses(&self, position: f64x2, same: f64x2) -> f64x2 {
+        let alive = !same | (position - self.changed_at).abs().simd_le(self.same_way);
+        alive & (position - self.anchor).abs().simd_le(self.standing_way)
+    }
+
+    /// How the torque changes, as [`Side::hear`].
+    #[inline(always)]
+    fn hear(&mut self, position: f64x2, torque: f64x2, reading: f64x2) {
+        let change = torque - reading;
+        let same = change.simd_eq(f64x2::ZERO);
+        self.same = (self.same + 1.0) & same;
+        self.changed_at = same.bitselect(self.changed_at, position);
+        self.rough += ((change - self.change).abs().fast_min(self.rough_most) - self.rough) * ROUGH_GAIN;
+        self.change = change;
+    }
+
+    /// Which commands are at constant speed, as [`crate::cycle::profile::Profile::cruises`].
+    #[inline(always)]
+    fn cruises(&self, target: f64x2, speed: f64x2) -> f64x2 {
+        speed.abs().simd_eq(self.speed_max) & ((self.goal - target) * speed).simd_gt(self.braking * self.speed_max)
+    }
+
+    /// Speed of the commands that go on, as [`crate::cycle::profile::Profile::step`] short of the goal.
+    #[inline(always)]
+    fn speed(&self, target: f64x2, speed: f64x2) -> f64x2 {
+        let (a, left) = (self.acceleration, self.goal - target);
+        let stops = (a * (left.abs() * 2.0 + a * 0.25)).sqrt() - a * 0.5;
+        let wanted = stops.fast_min(self.speed_max) | (left & f64x2::splat(-0.0));
+        let next = wanted.fast_max(speed - a).fast_min(speed + a);
+        (next * left).simd_gt(left * left).bitselect(left, next) & self.goes
+    }
+}
+
+impl Homing {
+    /// Says for how many cycles more all goes on, at most `left`; after a cycle that was put out.
+    pub(super) fn see_usual(&mut self, left: u32) {
+        if self.plan.motors == 2 {
+            self.see_both(left);
+        } else {
+            self.sides[0].grant(&self.plan, left);
+        }
+    }
+
+    fn see_both(&mut self, left: u32) {
+        let (plan, sides) = (&self.plan, &self.sides);
+        let ahead = [&sides[0], &sides[1]].map(|side| side.look_ahead(plan));
+        let least = |of: [u32; 2]| of[0].min(of[1]).min(left).min(i32::MAX as u32);
+        let cycles = least(ahead.map(|side| side.cycles));
+        if cycles == 0 {
+            return;
+        }
+        let cruise = least(ahead.map(|side| side.cruise)).min(cycles);
+        let square = if self.phase == Phase::Touch { plan.square } else { f64::INFINITY };
+        let middle = lanes(|i| 0.5 * (ahead[i].low + ahead[i].high));
+        let traces = [&sides[0].trace, &sides[1].trace];
+        self.usual = Usual {
+            cruise: cruise as i32,
+            slow: cycles - cruise,
+            granted: cycles,
+            cruises: cruise > 0,
+            even: traces[0].even_with(traces[1]),
+            paused: traces.iter().all(|trace| trace.paused()),
+            speed: lanes(|i| sides[i].profile.speed),
+            position: lanes(|i| sides[i].position),
+            reading: lanes(|i| sides[i].reading),
+            filtered: lanes(|i| sides[i].filtered) - middle,
+            lowest: lanes(|i| sides[i].lowest) - middle,
+            sliding: lanes(|i| sides[i].sliding) - middle,
+            share: f64x2::splat(plan.torque_share),
+            drift: middle * GAIN,
+            middle,
+            band: lanes(|i| 0.5 * (ahead[i].high - ahead[i].low)),
+            stands: false,
+            lag: f64x2::ZERO,
+            lag_band: f64x2::ZERO,
+            rest: Rest {
+                held: mask(|i| sides[i].held),
+                goes: mask(|i| sides[i].goes_on(plan)),
+                start: lanes(|i| sides[i].start),
+                anchor: lanes(|i| sides[i].anchor),
+                frozen: lanes(|i| f64::from(sides[i].frozen)),
+                frozen_limit: lanes(|i| f64::from(sides[i].frozen_limit)),
+                goal: lanes(|i| sides[i].profile.goal()),
+                speed_max: lanes(|i| sides[i].profile.speed_max()),
+                braking: lanes(|i| sides[i].profile.braking()),
+                free: lanes(|i| sides[i].free[1]) - middle,
+                free_reading: lanes(|i| sides[i].free[0]),
+                change: lanes(|i| sides[i].change),
+                rough: lanes(|i| sides[i].rough),
+                same: lanes(|i| f64::from(sides[i].same)),
+                changed_at: lanes(|i| sides[i].changed_at),
+                lag_limit: f64x2::splat(plan.lag_limit),
+                jump: f64x2::splat(plan.jump),
+                distance: f64x2::splat(plan.distance[1]),
+                acceleration: f64x2::splat(plan.acceleration),
+                standing_way: f64x2::splat(plan.standing_way),
+                rough_most: f64x2::splat(0.5 * plan.limit),
+                same_way: f64x2::splat(0.25 * plan.retract),
+                from: lanes(|i| sides[i].from),
+                turn: f64x2::splat(UNDER_WAY * plan.retract),
+                turning: f64x2::splat(0.5 * RIGID_AFTER_TURN * plan.limit),
+                under_way: f64x2::splat(0.5 * RIGID * plan.limit),
+                half_jump: lanes(|i| 0.5 * (plan.jump - sides[i].profile.speed_max())),
+                sense: f64x2::splat(plan.sense),
+                apart: square,
+            },
+        };
+        let stands = |side: &Side| side.held && !side.goes_on(plan) && side.reads_on(plan);
+        let target = lanes(|i| sides[i].profile.position);
+        if sides.iter().all(stands) {
+            self.usual.stand(target);
+        } else {
+            self.usual.centre(target - self.usual.speed - self.usual.position, self.usual.position);
+        }
+    }
+
+    /// Ends what was granted: the sides catch up, if cycles went by.
+    #[inline(always)]
+    pub(super) fn end_usual(&mut self) -> bool {
+        self.now = self.now.saturating_add(self.sides[0].quick_cycles());
+        self.sides[0].look_no_further();
+        let went = self.usual.gone() > 0;
+        if went {
+            self.catch_up();
+        }
+        (self.usual.cruise, self.usual.slow, self.usual.granted) = (0, 0, 0);
+        went
+    }
+
+    fn catch_up(&mut self) {
+        for (i, side) in self.sides.iter_mut().enumerate().take(self.plan.motors) {
+            side.catch_up(&self.usual.caught(i, self.output.target_position_mm[i & 1]));
+        }
+        self.now = self.now.saturating_add(self.usual.gone());
+    }
+
+    /// One servo cycle if it is a usual one at constant speed; else [`Homing::quick_both_slow`] must follow.
+    #[inline(always)]
+    pub fn quick_both(&mut self, input: &HomingInput, output: &mut HomingOutput) -> bool {
+        let u = &mut self.usual;
+        // Counted down first: that takes the fewest instructions.
+        u.cruise -= 1;
+        if u.cruise < 0 || !sound(input.torque_limit) {
+            return false;
+        }
+        let (position, torque) = (f64x2::new(input.position_mm), f64x2::new(input.torque));
+        let target = f64x2::new(self.output.target_position_mm);
+        // The middle of the band is zero at constant speed.
+        let filtered = u.filtered * (1.0 - GAIN) + u.share * torque;
+        // What is no number is in no band.
+        let usual = (target - position - u.lag).abs().simd_le(u.lag_band)
+            & filtered.abs().simd_le(u.band)
+            & position.simd_ne(u.position);
+        if usual.to_bitmask() ^ 3 | input.flags != 0 {
+            return false;
+        }
+        u.take_in(position, torque, filtered, &mut self.sides);
+        self.output.target_position_mm = (target + u.speed).to_array();
+        *output = self.output;
+        true
+    }
+
+    /// The same for a cycle that is not at constant speed; false when it is unlike too, and nothing is done. Comes after a
+    /// [`Homing::quick_both`] that was false, and takes back what that has counted.
+    #[inline(always)]
+    pub fn quick_both_slow(&mut self, input: &HomingInput, output: &mut HomingOutput) -> bool {
+        let u = &mut self.usual;
+        u.cruise += 1;
+        if u.cruise as u32 + u.slow == 0 || input.flags != 0 || !sound(input.torque_limit) {
+            return false;
+        }
+        let (position, torque) = (f64x2::new(input.position_mm), f64x2::new(input.torque));
+        let filtered = u.filter(torque);
+        let target = f64x2::new(self.output.target_position_mm);
+        let all = |bits: f64x2| bits.to_bitmask() == 3;
+        if u.stands {
+            if !all((position - u.rest.anchor).abs().simd_le(u.lag_band) & filtered.abs().simd_le(u.band)) {
+                return false;
+            }
+            u.slow -= 1;
+            u.rest.hear(position, torque, u.reading);
+            (u.position, u.reading, u.filtered) = (position, torque, filtered);
+            *output = self.output;
+            return true;
+        }
+        let cruises = u.cruise > 0;
+        if !all(u.bounded(position, filtered, target)) {
+            return false;
+        }
+        // At constant speed it may be that nothing but the lag has left its band.
+        let moves = all(u.moves(position));
+        if !(cruises && moves) {
+            let standing = u.standing(position);
+            if !all(u.sane(position, torque, filtered, &standing)) {
+                return false;
+            }
+            (u.rest.frozen, u.rest.free, u.rest.free_reading) = standing;
+            u.rest.hear(position, torque, u.reading);
+        }
+        if cruises {
+            u.cruise -= 1;
+            u.take_in(position, torque, filtered, &mut self.sides);
+            if moves {
+                u.centre(target - position, position);
+            } else {
+                u.lag_band = f64x2::splat(f64::NAN);
+            }
+        } else {
+            u.slow -= 1;
+            let sliding = u.rest.cruises(target, u.speed).bitselect(filtered, u.sliding);
+            u.take_in(position, torque, filtered, &mut self.sides);
+            u.sliding = sliding;
+            u.speed = u.rest.speed(target, u.speed);
+            self.output.target_speed_mm_s = (u.speed * self.plan.cycles_per_s).to_array();
+        }
+        self.output.target_position_mm = (target + u.speed).to_array();
+        *output = self.output;
+        true
+    }
+}

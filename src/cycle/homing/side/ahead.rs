@@ -1,0 +1,110 @@
+//! How long a motor's cycles will be like the one before, and what tells that they are not.
+
+use super::*;
+
+/// What can be said of a motor's next cycles.
+#[derive(Debug, Clone, Copy)]
+pub struct Ahead {
+    /// Cycles in which it meets no end of a way or time, and of them those, the first, with a command at constant speed.
+    pub cycles: u32,
+    /// See `cycles`.
+    pub cruise: u32,
+    /// Lowest filtered torque of usual cycles.
+    pub low: f64,
+    /// Highest.
+    pub high: f64,
+}
+
+/// What usual cycles have made of a motor: cycles gone by, and the fields of [`Side`] and its profile that they change.
+#[derive(Debug, Clone, Copy)]
+#[expect(missing_docs, reason = "named as in Side")]
+pub struct Caught {
+    pub cycles: u32,
+    pub cruises: bool,
+    pub frozen: u32,
+    pub position: f64,
+    pub reading: f64,
+    pub filtered: f64,
+    pub lowest: f64,
+    pub sliding: f64,
+    pub free: [f64; 2],
+    pub change: f64,
+    pub rough: f64,
+    pub same: u32,
+    pub changed_at: f64,
+    pub target: f64,
+    pub speed: f64,
+}
+
+impl Side {
+    /// Looks ahead, after a cycle's step of the command. The last cycles of a move are left to the other steps.
+    #[must_use]
+    pub fn look_ahead(&self, plan: &Plan) -> Ahead {
+        let p = &self.profile;
+        let (way, speed) = (p.left().abs(), p.speed_max());
+        // Of the way that is left at the largest speed; the last part takes as long as braking does.
+        let to_goal =
+            higher(way / speed - 2.0 * plan.acceleration / speed, (2.0 * way / plan.acceleration).sqrt()) - 4.0;
+        let (low, high) = (-self.trip, self.trip);
+        let ahead = Ahead { cycles: to_goal as u32, cruise: 0, low, high };
+        if self.held {
+            let next = match self.standing {
+                standing if standing < plan.hold => plan.hold,
+                standing if standing < plan.detection => plan.detection,
+                _ => u32::MAX, // the other motor is waited for
+            };
+            let to_next = next.saturating_sub(self.standing + 1);
+            let cycles = if self.goes_on(plan) { to_next.min(ahead.cycles) } else { to_next };
+            return Ahead { cycles, low: plan.release, high: plan.bound, ..ahead };
+        }
+        if !p.cruises() {
+            // While it speeds up, until it has; the rest is then at constant speed.
+            let to_speed = (speed - p.speed.copysign(p.speed * p.left())) / plan.acceleration;
+            let speeds_up = way > p.braking();
+            return Ahead { cycles: if speeds_up { ahead.cycles.min(to_speed as u32) } else { ahead.cycles }, ..ahead };
+        }
+        let to_end = plan.distance[1] - plan.sense * (p.position - self.start);
+        let away = p.speed * plan.sense < 0.0;
+        // The axis may lead its command by the largest lag.
+        let free = lower(way - p.braking() - 2.0 * speed, if away { way } else { to_end - plan.lag_limit });
+        Ahead { cruise: (free / speed) as u32, ..ahead }
+    }
+
+    /// Takes over what usual cycles have made of it.
+    pub fn catch_up(&mut self, caught: &Caught) {
+        if self.held {
+            self.standing += caught.cycles;
+        }
+        (self.same, self.changed_at) = if !caught.cruises {
+            (caught.same, caught.changed_at)
+        } else if self.reading == caught.reading {
+            // At constant speed nobody looks whether the torque changes from one cycle to the next.
+            (self.same.saturating_add(caught.cycles), self.changed_at)
+        } else {
+            (0, caught.position)
+        };
+        self.frozen = caught.frozen;
+        self.position = caught.position;
+        self.reading = caught.reading;
+        self.filtered = caught.filtered;
+        self.lowest = caught.lowest;
+        self.sliding = caught.sliding;
+        self.free = caught.free;
+        self.change = caught.change;
+        self.rough = caught.rough;
+        self.profile.position = caught.target;
+        self.profile.speed = caught.speed;
+    }
+
+    /// Whether a torque that no longer changed would, within the way of a standing axis, not be taken for a stuck one.
+    #[must_use]
+    pub fn reads_on(&self, plan: &Plan) -> bool {
+        (self.anchor - self.changed_at).abs() + plan.standing_way <= 0.25 * plan.retract
+    }
+
+    /// Whether the command goes on: it ends where the motor stands pressed.
+    #[must_use]
+    pub fn goes_on(&self, plan: &Plan) -> bool {
+        !self.held || self.standing < plan.hold
+    }
+}
