@@ -34,8 +34,8 @@ pub static LAW: Law = Law {
         let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(shape)).collect();
         table_side::terms(frame, &effects)
     },
-    // Within two steps of the encoder a turn is no crossing.
-    effect: |frame, shape, _| effect(shape).filter(|_| shape.first().is_some_and(|width| *width > 2e3 * frame.grid)),
+    // Within three steps of the encoder a turn is no crossing.
+    effect: |frame, shape, _| effect(shape).filter(|_| shape.first().is_some_and(|width| *width > 3e3 * frame.grid)),
     confused_with: &[Cause::PreslidingFriction, Cause::DriveCompliance],
     sentence: |effect, axis| match effect {
         Effect::Backlash { width_um, .. } => format!(

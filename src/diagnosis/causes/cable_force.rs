@@ -20,8 +20,8 @@ pub static LAW: Law = Law {
         let slope = *c.first()?;
         let zero_mm = c.get(1).map_or(0.0, |level| -level / slope);
         let (low, high) = frame.stroke();
-        let room = 0.1 * (high - low);
-        // A zero far off the stroke is a constant torque of its own, not the cable's.
+        let room = high - low;
+        // A zero farther off than a stroke is a constant torque of its own, not the cable's.
         (zero_mm == 0.0 || (zero_mm > low - room && zero_mm < high + room))
             .then_some(Effect::CableForce { slope, zero_mm })
     },
