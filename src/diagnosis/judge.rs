@@ -10,7 +10,7 @@ use super::fit::{Bench, Fit};
 use super::frame::Columns;
 use super::gain::{self, Gain};
 use super::progress::{Stopped, Watch};
-use super::select::{Selection, physical_parts};
+use super::select::Selection;
 use super::show::{self, Coordinate};
 use super::verdict::Verdict;
 use crate::machine::{Axis, Cause};
@@ -62,11 +62,7 @@ impl Judge<'_, '_, '_> {
     ///
     /// # Errors
     /// [`Stopped`] when the watch's caller said so.
-    pub fn judge(&self, mut selection: Selection) -> Result<Judged, Stopped> {
-        let parts = physical_parts(self.bench, &selection.fit);
-        if parts.len() < selection.fit.parts.len() {
-            selection.fit = self.bench.refine(self.bench.fit(parts), 0, 4);
-        }
+    pub fn judge(&self, selection: Selection) -> Result<Judged, Stopped> {
         let selection = self.without_idle_spring(selection)?;
         let Some(verdict) = self.explains(&selection.fit) else { return self.nothing(&selection) };
         let gains = self.gains([self.empty, &selection.fit])?;

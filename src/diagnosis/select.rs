@@ -269,14 +269,8 @@ fn is_physical(bench: &Bench, fit: &Fit) -> bool {
     let mut few: Vec<Cause> = few.collect();
     few.sort();
     let one_of_each = few.windows(2).all(|pair| pair[0] != pair[1]);
-    one_of_each && physical_parts(bench, fit).len() == fit.parts.len()
-}
-
-/// The parts of a set whose numbers a machine can have.
-#[must_use]
-pub fn physical_parts(bench: &Bench, fit: &Fit) -> Vec<Part> {
-    let parts = fit.parts.iter().zip(&fit.coefficients);
-    parts.filter(|(p, c)| (p.law.effect)(bench.frame, &p.shape, c).is_some()).map(|(p, _)| p.clone()).collect()
+    one_of_each
+        && fit.parts.iter().zip(&fit.coefficients).all(|(p, c)| (p.law.effect)(bench.frame, &p.shape, c).is_some())
 }
 
 /// Drops causes that the others do without as they are, weakest first: refined, the others would do without them all the more.
