@@ -5,7 +5,6 @@
 
 use super::causes::Law;
 use super::fit::{Bench, Fit, Part, dot, figure};
-use crate::machine::Cause;
 
 /// Times over which rows are summed, s, and how far apart the points of a slope are, in steps of each scale.
 const STAGES: [(f64, f64); 3] = [(0.05, 12.0), (0.02, 8.0), (0.006, 4.0)];
@@ -25,12 +24,6 @@ impl<'f, 'a> Approach<'f, 'a> {
     #[must_use]
     pub fn new(bench: &Bench<'f, 'a>) -> Self {
         Self { stages: STAGES.map(|(seconds, stride)| (bench.smoothed(seconds), stride)).into() }
-    }
-
-    /// Whether a law is to be approached.
-    #[must_use]
-    pub fn suits(law: &Law) -> bool {
-        law.cause == Cause::Backlash
     }
 
     /// The law at these starts on the sums, for [`Approach::from`].

@@ -23,7 +23,7 @@ pub struct Gain {
 
 /// Errors of one machine on a recording: torque, closed-loop position, table position; NaN where not predicted, and for the
 /// torque where the axis stands, since friction then is not a function of the motion.
-type Errors = [Option<Vec<f64>>; 3];
+pub type Errors = [Option<Vec<f64>>; 3];
 
 fn errors(axis: &Axis, observed: &Observed) -> Option<Errors> {
     let prediction = predict(axis, observed).ok()?;
@@ -51,37 +51,52 @@ pub fn on_holdout(axis: &Axis, extended: &Axis, observed: &Observed, watch: &Wat
     Ok(gains(axis, before, after))
 }
 
-/// What one set of causes gains over another on the fitted recording itself: half of its blocks are predicted by machines that
-/// were fitted to the others.
-///
-/// # Errors
-/// [`Stopped`] when the watch's caller said so.
-pub fn on_held_out_blocks(
-    axis: &Axis,
-    columns: &Columns,
-    bench: &Bench,
-    [less, full]: [&Fit; 2],
-    watch: &Watch,
-) -> Result<Vec<Gain>, Stopped> {
-    let Some(mut observed) = columns.observed() else { return Ok(Vec::new()) };
-    if columns.left_out > 0 {
-        // What the axis did in between is not at hand, so that no loop can be replayed.
-        observed.command = None;
+/// The fitted recording itself as rows that were not fitted: half of its blocks are predicted by a machine that was fitted to
+/// the others.
+pub struct HeldOut<'g, 'f, 'a> {
+    axis: &'g Axis,
+    bench: &'g Bench<'f, 'a>,
+    watch: &'g Watch<'g>,
+    observed: Option<Observed>,
+    /// The half that each row belongs to, see [`half_of_rows`].
+    half: Vec<usize>,
+}
+
+impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
+    /// Of every row of the recording.
+    #[must_use]
+    pub fn new(axis: &'g Axis, columns: &Columns, bench: &'g Bench<'f, 'a>, watch: &'g Watch<'g>) -> Self {
+        let mut observed = columns.observed();
+        if let Some(observed) = observed.as_mut().filter(|_| columns.left_out > 0) {
+            // What the axis did in between is not at hand, so that no loop can be replayed.
+            observed.command = None;
+        }
+        let half = observed.as_ref().map_or_else(Vec::new, |observed| half_of_rows(bench, &observed.time_s));
+        Self { axis, bench, watch, observed, half }
     }
-    let half = half_of_rows(bench, &observed.time_s);
-    let mut channels = Vec::new();
-    for fit in [less, full] {
+
+    /// Errors of the belief with a set of causes; `None` where nothing can be predicted.
+    ///
+    /// # Errors
+    /// [`Stopped`] when the watch's caller said so.
+    pub fn errors(&self, fit: &Fit) -> Result<Option<Errors>, Stopped> {
+        let Some(observed) = &self.observed else { return Ok(None) };
         // Without a cause both halves are the belief.
         let halves = if fit.parts.is_empty() { 0..1 } else { 0..2 };
-        let machines: Vec<Axis> = halves.map(|half| fitted_without(axis, bench, fit, half)).collect();
-        let of_half = watch.each(&machines, (0.92, 0.99), "measuring the gain", |axis| errors(axis, &observed))?;
-        let (Some(Some(even)), Some(Some(odd))) = (of_half.first(), of_half.last()) else { return Ok(Vec::new()) };
-        channels.push(std::array::from_fn(|channel| {
+        let machines: Vec<Axis> = halves.map(|half| fitted_without(self.axis, self.bench, fit, half)).collect();
+        let of_half = self.watch.each(&machines, (0.92, 0.99), "measuring the gain", |axis| errors(axis, observed))?;
+        let (Some(Some(even)), Some(Some(odd))) = (of_half.first(), of_half.last()) else { return Ok(None) };
+        Ok(Some(std::array::from_fn(|channel| {
             let (even, odd) = (even[channel].as_ref()?, odd[channel].as_ref()?);
-            Some(half.iter().enumerate().map(|(i, half)| [even[i], odd[i], f64::NAN][*half]).collect())
-        }));
+            Some(self.half.iter().enumerate().map(|(i, half)| [even[i], odd[i], f64::NAN][*half]).collect())
+        })))
     }
-    Ok(gains(axis, &channels[0], &channels[1]))
+
+    /// The gains of one set of causes over another by their errors.
+    #[must_use]
+    pub fn gains(&self, before: Option<&Errors>, after: Option<&Errors>) -> Vec<Gain> {
+        before.zip(after).map_or_else(Vec::new, |(before, after)| gains(self.axis, before, after))
+    }
 }
 
 /// The axis with effects whose coefficients are fitted without the blocks of one half.

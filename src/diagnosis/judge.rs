@@ -8,7 +8,7 @@
 
 use super::fit::{Bench, Fit};
 use super::frame::Columns;
-use super::gain::{self, Gain};
+use super::gain::{Errors, Gain, HeldOut};
 use super::progress::{Stopped, Watch};
 use super::select::Selection;
 use super::show::{self, Coordinate};
@@ -32,16 +32,11 @@ const MOST_OF_A_CURVE: f64 = 0.03;
 
 /// What stays the same while sets of causes are judged.
 pub struct Judge<'j, 'f, 'a> {
-    /// The belief.
-    pub axis: &'j Axis,
-    /// The recording, every row.
-    pub whole: &'j Columns,
-    /// The system of equations.
-    pub bench: &'j Bench<'f, 'a>,
-    /// The fit without a cause.
-    pub empty: &'j Fit,
-    /// Told how far it is.
-    pub watch: &'j Watch<'j>,
+    bench: &'j Bench<'f, 'a>,
+    held_out: HeldOut<'j, 'f, 'a>,
+    /// The fit without a cause, and its errors on held-out blocks.
+    empty: Fit,
+    believed: Option<Errors>,
 }
 
 /// What may be said.
@@ -57,69 +52,78 @@ pub struct Judged {
     pub refutation: Option<String>,
 }
 
-impl Judge<'_, '_, '_> {
+impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
+    /// A judge of what is found on a bench about an axis; `whole` is the recording, every row.
+    ///
+    /// # Errors
+    /// [`Stopped`] when the watch's caller said so.
+    pub fn new(
+        axis: &'j Axis,
+        whole: &Columns,
+        bench: &'j Bench<'f, 'a>,
+        watch: &'j Watch<'j>,
+    ) -> Result<Self, Stopped> {
+        let (held_out, empty) = (HeldOut::new(axis, whole, bench, watch), bench.fit(Vec::new()));
+        let believed = held_out.errors(&empty)?;
+        Ok(Self { bench, held_out, empty, believed })
+    }
+
     /// Judges a set of causes.
     ///
     /// # Errors
     /// [`Stopped`] when the watch's caller said so.
-    pub fn judge(&self, selection: Selection) -> Result<Judged, Stopped> {
-        let selection = self.without_idle_spring(selection)?;
-        let Some(verdict) = self.explains(&selection.fit) else { return self.nothing(&selection) };
-        let gains = self.gains([self.empty, &selection.fit])?;
-        if !refuted(&gains) {
-            return Ok(Judged { verdict, selection, gains, refutation: None });
-        }
-        let causes = selection.fit.parts.iter().map(|p| p.law.cause);
-        let refutation = refutation(causes, &gains, "rows that it was not fitted to");
-        Ok(Judged { refutation: Some(refutation), ..self.nothing(&selection)? })
-    }
-
-    /// Leaves out what is simulated behind the measured motion (a spring, a clearance) where the machine with it is known to be
-    /// worse, or not known to be better in any channel: it may gain by taking off what the encoder's noise makes, and such a
-    /// gain is none of the machine's. Half of a channel's rest is never noise of the encoder alone.
-    fn without_idle_spring(&self, mut found: Selection) -> Result<Selection, Stopped> {
-        let Some(simulated) = found.fit.parts.iter().position(|p| p.law.simulated) else { return Ok(found) };
-        let mut parts = found.fit.parts.clone();
-        parts.remove(simulated);
-        let less = self.bench.refine(self.bench.fit(parts), 0, 4);
-        if !found.fit.halves(&less) {
-            let gains = self.gains([&less, &found.fit])?;
-            let no_better = !gains.is_empty() && gains.iter().all(|gain| gain.ci95[0] <= 1.0);
-            if no_better || refuted(&gains) {
-                found.fit = less;
+    pub fn judge(&self, mut found: Selection) -> Result<Judged, Stopped> {
+        let Some(mut verdict) = self.explains(&found.fit) else { return Ok(self.nothing(&found)) };
+        let mut errors = self.held_out.errors(&found.fit)?;
+        if let Some(less) = self.without_spring(&found.fit) {
+            let without = if less.parts.is_empty() { self.believed.clone() } else { self.held_out.errors(&less)? };
+            if is_idle(&self.held_out.gains(without.as_ref(), errors.as_ref())) {
+                (found.fit, errors) = (less, without);
+                let Some(still) = self.explains(&found.fit) else { return Ok(self.nothing(&found)) };
+                verdict = still;
             }
         }
-        Ok(found)
+        let gains = self.held_out.gains(self.believed.as_ref(), errors.as_ref());
+        if !refuted(&gains) {
+            return Ok(Judged { verdict, selection: found, gains, refutation: None });
+        }
+        let causes = found.fit.parts.iter().map(|p| p.law.cause);
+        let refutation = refutation(causes, &gains, "rows that it was not fitted to");
+        Ok(Judged { refutation: Some(refutation), ..self.nothing(&found) })
     }
 
-    fn gains(&self, sets: [&Fit; 2]) -> Result<Vec<Gain>, Stopped> {
-        gain::on_held_out_blocks(self.axis, self.whole, self.bench, sets, self.watch)
+    /// A set without what is simulated behind the measured motion (a spring, a clearance), where that may gain by taking off what
+    /// the encoder's noise makes alone: half of a channel's rest is never that.
+    fn without_spring(&self, fit: &Fit) -> Option<Fit> {
+        let simulated = fit.parts.iter().position(|p| p.law.simulated)?;
+        let mut parts = fit.parts.clone();
+        parts.remove(simulated);
+        let less = self.bench.refine(self.bench.fit(parts), 0, 4);
+        (!fit.halves(&less)).then_some(less)
     }
 
     /// What is to be said when none of the causes that were found is to be named.
-    ///
-    /// # Errors
-    /// [`Stopped`] when the watch's caller said so.
-    pub fn nothing(&self, found: &Selection) -> Result<Judged, Stopped> {
-        let before = Excess::of(self.bench, self.empty, &found.fit);
+    #[must_use]
+    pub fn nothing(&self, found: &Selection) -> Judged {
+        let before = Excess::of(self.bench, &self.empty, &found.fit);
         let unknown = before.largest() > TOLERABLE_EXCESS;
-        Ok(Judged {
+        Judged {
             verdict: if unknown { Verdict::UnknownCause } else { Verdict::NoDiscrepancy },
             selection: Selection { fit: self.empty.clone(), rivals: Vec::new() },
-            gains: self.gains([self.empty; 2])?,
+            gains: self.held_out.gains(self.believed.as_ref(), self.believed.as_ref()),
             refutation: None,
-        })
+        }
     }
 
     /// How well a set of causes explains the excess; `None` where it does not, or there is no cause.
     fn explains(&self, fit: &Fit) -> Option<Verdict> {
-        let before = Excess::of(self.bench, self.empty, fit);
+        let before = Excess::of(self.bench, &self.empty, fit);
         let after = Excess::of(self.bench, fit, fit);
         let lost_motion = fit.parts.iter().any(|p| p.law.cause == Cause::Backlash);
         let least = if lost_motion { LEAST_EXPLAINED_LOST_MOTION } else { LEAST_EXPLAINED };
         let too_little = before.largest() > TOLERABLE_EXCESS && before.explained_by(&after) < least;
         let much_left = after.largest() > LITTLE_LEFT;
-        if fit.parts.is_empty() || too_little || much_left && is_another_curve(self.bench, self.empty, fit) {
+        if fit.parts.is_empty() || too_little || much_left && is_another_curve(self.bench, &self.empty, fit) {
             None
         } else if much_left {
             Some(Verdict::PartlyExplained)
@@ -154,6 +158,13 @@ fn is_another_curve(bench: &Bench, empty: &Fit, fit: &Fit) -> bool {
 pub fn refuted(gains: &[Gain]) -> bool {
     let motor = || gains.iter().filter(|gain| gain.channel != "table_position");
     motor().any(|gain| gain.ci95[1] < 1.0) && motor().map(|gain| (gain.before / gain.after).ln()).sum::<f64>() < 0.0
+}
+
+/// Whether the machine is known to be worse with a cause, or not known to be better in any channel: what such a cause gains in
+/// the balance is none of the machine's.
+fn is_idle(gains: &[Gain]) -> bool {
+    let no_better = !gains.is_empty() && gains.iter().all(|gain| gain.ci95[0] <= 1.0);
+    no_better || refuted(gains)
 }
 
 /// Says what causes are refuted, and by which rows.

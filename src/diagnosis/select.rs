@@ -118,8 +118,10 @@ fn shelf(bench: &Bench, approach: &Approach, laws: &[&'static Law], watch: &Watc
         .flat_map(|&law| bench.starts(law, &empty).chunks(AT_A_TIME).map(|c| (law, c.to_vec())).collect::<Vec<_>>())
         .collect();
     let laid = watch.each(&starts, (0.05, 0.15), "laying out what each cause would do", |(law, shapes)| {
-        let approached = Approach::suits(law);
-        (law.cause, if approached { approach.starts(law, shapes.clone()) } else { bench.parts(law, shapes.clone()) })
+        (
+            law.cause,
+            if law.approached { approach.starts(law, shapes.clone()) } else { bench.parts(law, shapes.clone()) },
+        )
     })?;
     let mut shelf = Shelf::new();
     for (cause, parts) in laid {
@@ -233,7 +235,7 @@ fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Vec<C
     let Search { bench, approach, shelf, .. } = search;
     let shelved = || shelf.get(&law.cause).map_or(&[][..], Vec::as_slice);
     let fresh: Vec<Part>;
-    let parts: &[Part] = if Approach::suits(law) {
+    let parts: &[Part] = if law.approached {
         fresh = bench.parts(law, approach.from(shelved(), set).into_iter().collect());
         &fresh
     } else if law.starts_from_rest {

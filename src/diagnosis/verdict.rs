@@ -20,6 +20,7 @@ use crate::recording::{Recording, RecordingError};
 /// Judged time below which nothing is said, s, and judged rows.
 const LEAST_SECONDS: f64 = 1.0;
 const LEAST_ROWS: usize = 300;
+
 /// The five answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -117,13 +118,15 @@ pub fn diagnose(
     let bench = Bench::new(&frame, &known::trace(axis, &frame));
     let empty = bench.fit(Vec::new());
     let laws: Vec<&'static Law> = LAWS.iter().copied().filter(|law| belief::may_be_found(axis, law.cause)).collect();
-    let judge = Judge { axis, whole: &whole, bench: &bench, empty: &empty, watch: &watch };
+    let judge = Judge::new(axis, &whole, &bench, &watch)?;
     let search = Search::new(&bench, &laws, &watch)?;
     let mut judged = judge.judge(search.from_belief()?)?;
     if judged.verdict == Verdict::UnknownCause {
         // Of several numbers of the belief that are wrong together none shows the way by itself.
         let again = judge.judge(search.from_open_belief()?)?;
-        if again.verdict != Verdict::UnknownCause {
+        if again.verdict == Verdict::UnknownCause {
+            judged.refutation = judged.refutation.or(again.refutation);
+        } else {
             judged = again;
         }
     }
@@ -138,7 +141,7 @@ pub fn diagnose(
                 if refuted(&judged.gains) {
                     let causes = findings.iter().map(|f| f.effect.cause());
                     notes.push(refutation(causes, &judged.gains, "the hold-out"));
-                    judged = judge.nothing(&judged.selection)?;
+                    judged = judge.nothing(&judged.selection);
                     (findings, extended) = (Vec::new(), axis.clone());
                     judged.gains = gain::on_holdout(axis, axis, &observed, &watch)?;
                 }

@@ -20,15 +20,11 @@ pub static LAW: Law = Law {
         // A width that is a fifth off meets the flanks at the wrong time and explains little.
         let least = (3.0 * frame.grid).max(2e-3) * 1e3;
         let widths = log_spaced(least, (10.0 * least).max(300.0), 12);
-        let shares = [0.33, 0.52].into_iter().flat_map(|table| [0.5, 0.67, 0.84].map(|friction| (table, friction)));
-        let shares: Vec<(f64, f64)> = shares.collect();
-        widths
-            .flat_map(|w| {
-                shares.iter().map(move |&(table, friction)| vec![w, table, friction, 700.0]).collect::<Vec<_>>()
-            })
-            .collect()
+        let at = |w| [0.33, 0.52].map(|table| [0.5, 0.67, 0.84].map(|friction| vec![w, table, friction, 700.0]));
+        widths.flat_map(|w| at(w).into_iter().flatten()).collect()
     },
     starts_from_rest: false,
+    approached: true,
     simulated: true,
     terms: |frame, shapes| {
         let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(shape)).collect();

@@ -8,6 +8,7 @@ pub static LAW: Law = Law {
     scales: &[Scale::Choice],
     starts: |_, _| vec![vec![0.0], vec![1.0]],
     starts_from_rest: false,
+    approached: false,
     simulated: false,
     terms: |frame, shapes| {
         each(shapes, |shape| {

@@ -9,6 +9,7 @@ pub static LAW: Law = Law {
     scales: &[Scale::Linear(1.0, 1e6, 0.02)],
     starts: |frame, rest| periods::along_stroke(frame, rest.torque),
     starts_from_rest: true,
+    approached: false,
     simulated: false,
     terms: |frame, shapes| {
         each(shapes, |shape| {
@@ -18,12 +19,8 @@ pub static LAW: Law = Law {
         })
     },
     effect: |frame, shape, c| {
-        let [sine, cosine] = c.try_into().ok()?;
-        let (low, high) = frame.stroke();
-        if *shape.first()? <= periods::WHOLE {
-            return None;
-        }
-        Some(Effect::Cogging { amplitude: f64::hypot(sine, cosine), period_mm: (high - low) / shape.first()? })
+        let (amplitude, period_mm) = periods::ripple(frame, *shape.first()?, c.try_into().ok()?)?;
+        Some(Effect::Cogging { amplitude, period_mm })
     },
     confused_with: &[Cause::ExternalVibration, Cause::PositionDependentFriction],
     sentence: |effect, axis| match effect {

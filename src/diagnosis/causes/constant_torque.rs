@@ -8,6 +8,7 @@ pub static LAW: Law = Law {
     scales: &[],
     starts: one_start,
     starts_from_rest: false,
+    approached: false,
     simulated: false,
     terms: |frame, shapes| each(shapes, |_| Term::torque(vec![1.0; frame.kept.len()])),
     effect: |frame, _, c| Some(Effect::ConstantTorque { torque: frame.belief.constant + c.first()? }),

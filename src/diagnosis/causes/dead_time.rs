@@ -15,6 +15,7 @@ pub static LAW: Law = Law {
         (-count..=count).filter(|i| *i != 0).map(|i| vec![f64::from(i) * step]).collect()
     },
     starts_from_rest: false,
+    approached: false,
     simulated: false,
     terms: |frame, shapes| {
         each(shapes, |shape| {

@@ -8,6 +8,7 @@ pub static LAW: Law = Law {
     scales: &[],
     starts: one_start,
     starts_from_rest: false,
+    approached: false,
     simulated: false,
     terms: |frame, shapes| each(shapes, |_| Term::torque(frame.judged_by(|i| (frame.v[i] * frame.unit).abs()))),
     effect: |_, _, c| Some(Effect::DirectionDependentFriction { asymmetry: *c.first()? }),

@@ -29,6 +29,7 @@ pub static LAW: Law = Law {
         log_spaced(least, most, count).map(|own| vec![own / (1.0 - share).sqrt(), share, 0.7, 0.04]).collect()
     },
     starts_from_rest: false,
+    approached: false,
     simulated: true,
     terms: |frame, shapes| {
         let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(frame, shape)).collect();

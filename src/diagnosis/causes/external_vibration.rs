@@ -8,6 +8,7 @@ pub static LAW: Law = Law {
     scales: &[Scale::Linear(3.0, 1e9, 0.02)],
     starts: |frame, rest| periods::along_time(frame, rest.torque),
     starts_from_rest: true,
+    approached: false,
     simulated: false,
     terms: |frame, shapes| {
         each(shapes, |shape| {

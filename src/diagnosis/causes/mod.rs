@@ -98,6 +98,8 @@ pub struct Law {
     pub starts: fn(&Frame, &Rest) -> Vec<Vec<f64>>,
     /// Whether the starts depend on what is left.
     pub starts_from_rest: bool,
+    /// Whether the sum of squares is so rugged about the right parameters that they are approached from afar.
+    pub approached: bool,
     /// Whether the trace is a simulation of what happens between the rows.
     pub simulated: bool,
     /// The traces at given non-linear parameters, one for each set of them.

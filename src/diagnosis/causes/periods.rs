@@ -16,7 +16,7 @@ const LEAST_SHARE: f64 = 0.01;
 /// Fewest periods over the stroke from which a ripple is looked for.
 const LEAST_PERIODS: f64 = 1.5;
 /// Fewest at which it is found: of less than a whole period nobody knows that it repeats.
-pub const WHOLE: f64 = 1.1;
+const WHOLE: f64 = 1.1;
 /// Periods below which they are few: each of them is looked at, and there is one such ripple at most, since two and a slope are
 /// a Fourier series that imitates anything along the stroke.
 pub const FEW: f64 = 6.0;
@@ -77,9 +77,16 @@ pub fn along_stroke(frame: &Frame, rest: &[f64]) -> Vec<Vec<f64>> {
     starts
 }
 
-/// Whether a ripple of few periods over the stroke is there in each of them (in each half of the stroke at least): at least half as large as on the whole, and half as
-/// much again at most. `ripple` and `left` are what it explains and what is left, at the judged rows. What happens once, as a
-/// detent, is explained by a wave of few periods as well, and is not there elsewhere.
+/// Amplitude and period (load units) of waves with this many periods over the stroke; `None` where they are no whole period.
+pub fn ripple(frame: &Frame, periods: f64, [sine, cosine]: [f64; 2]) -> Option<(f64, f64)> {
+    let (low, high) = frame.stroke();
+    (periods > WHOLE).then(|| (f64::hypot(sine, cosine), (high - low) / periods))
+}
+
+/// Whether a ripple of few periods over the stroke is there in each of them (in each half of the stroke at least): at least
+/// half as large as on the whole, and half as much again at most. `ripple` and `left` are what it explains and what is left,
+/// at the judged rows. What happens once, as a detent, is explained by a wave of few periods as well, and is not there
+/// elsewhere.
 pub fn is_in_each_period(frame: &Frame, periods: f64, ripple: &[f64], left: &[f64]) -> bool {
     let count = periods.floor().clamp(2.0, FEW);
     let (low, high) = frame.stroke();

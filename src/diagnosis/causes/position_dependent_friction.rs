@@ -13,6 +13,7 @@ pub static LAW: Law = Law {
             .collect()
     },
     starts_from_rest: false,
+    approached: false,
     simulated: false,
     terms: |frame, shapes| {
         each(shapes, |shape| {

@@ -12,6 +12,7 @@ pub static LAW: Law = Law {
         log_spaced(least, (least * 10.0).max(500.0), 14).map(|d| vec![d]).collect()
     },
     starts_from_rest: false,
+    approached: false,
     simulated: false,
     terms: |frame, shapes| {
         each(shapes, |shape| {

@@ -8,6 +8,7 @@ pub static LAW: Law = Law {
     scales: &[Scale::Linear(1.0, 1e6, 0.02)],
     starts: |frame, rest| if rest.table.is_empty() { Vec::new() } else { periods::along_stroke(frame, rest.table) },
     starts_from_rest: true,
+    approached: false,
     simulated: false,
     terms: |frame, shapes| {
         each(shapes, |shape| {
@@ -17,13 +18,8 @@ pub static LAW: Law = Law {
         })
     },
     effect: |frame, shape, c| {
-        let [sine, cosine] = c.try_into().ok()?;
-        let (low, high) = frame.stroke();
-        if *shape.first()? <= periods::WHOLE {
-            return None;
-        }
-        let amplitude_um = 1e3 * f64::hypot(sine, cosine);
-        Some(Effect::ScrewPeriodicError { amplitude_um, period_mm: (high - low) / shape.first()? })
+        let (amplitude, period_mm) = periods::ripple(frame, *shape.first()?, c.try_into().ok()?)?;
+        Some(Effect::ScrewPeriodicError { amplitude_um: 1e3 * amplitude, period_mm })
     },
     confused_with: &[Cause::ScrewPitchError],
     sentence: |effect, axis| match effect {

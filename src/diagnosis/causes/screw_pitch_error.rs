@@ -8,6 +8,7 @@ pub static LAW: Law = Law {
     scales: &[],
     starts: |_, rest| if rest.table.is_empty() { Vec::new() } else { vec![Vec::new()] },
     starts_from_rest: false,
+    approached: false,
     simulated: false,
     terms: |frame, shapes| {
         each(shapes, |_| Term {

@@ -11,6 +11,7 @@ pub static LAW: Law = Law {
         log_spaced(2e-3 * top, 0.4 * top, 12).map(|v| vec![v]).collect()
     },
     starts_from_rest: false,
+    approached: false,
     simulated: false,
     terms: |frame, shapes| {
         each(shapes, |shape| {

@@ -8,6 +8,7 @@ pub static LAW: Law = Law {
     scales: &[Scale::Log(0.02, 3.0)],
     starts: |_, _| log_spaced(0.04, 2.0, 9).map(|share| vec![share]).collect(),
     starts_from_rest: false,
+    approached: false,
     simulated: false,
     terms: |frame, shapes| {
         each(shapes, |shape| {

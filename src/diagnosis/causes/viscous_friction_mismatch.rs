@@ -8,6 +8,7 @@ pub static LAW: Law = Law {
     scales: &[],
     starts: one_start,
     starts_from_rest: false,
+    approached: false,
     simulated: false,
     terms: |frame, shapes| each(shapes, |_| Term::torque(frame.speed.clone())),
     effect: |frame, _, c| {

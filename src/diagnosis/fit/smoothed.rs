@@ -50,9 +50,7 @@ impl Bench<'_, '_> {
         };
         self.fit(set.parts.iter().map(part).collect())
     }
-}
 
-impl Bench<'_, '_> {
     /// What is left when a part without coefficients joins a set.
     #[must_use]
     pub fn left_beside(&self, set: &Fit, part: &Part) -> Vec<f64> {
