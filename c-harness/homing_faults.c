@@ -9,7 +9,7 @@ const char *const homing_state_names[STATES] = {"limit", "approach", "press", "r
 
 const char *const homing_fault_names[FAULTS] = {
     "none",           "abort",          "drive trip",        "unknown flag",     "torque NaN",
-    "torque +inf",    "torque -inf",    "encoder NaN",       "encoder inf",      "limit in force NaN",
+    "torque +inf",    "torque -inf",    "encoder NaN",       "encoder inf",      "limit in force NaN", "limit lost",
     "torque stuck",   "torque stuck high", "torque inverted", "torque noisy",    "encoder frozen",
     "encoder slips",  "encoder jumps",  "no acknowledgement", "limit ignored",   "command not followed",
     "tight spot",     "stop gone",      "stop soft",         "stop too early",   "chips"};
@@ -183,7 +183,8 @@ int homing_names(homing_fault fault, int32_t first, const homing_branch *b)
         [FAULT_TORQUE_MINUS_INF] = {GIB_ERR_NON_FINITE},
         [FAULT_ENCODER_NAN] = {GIB_ERR_NON_FINITE},
         [FAULT_ENCODER_INF] = {GIB_ERR_NON_FINITE},
-        [FAULT_LIMIT_NAN] = {GIB_ERR_NON_FINITE, GIB_DONE},
+        [FAULT_LIMIT_NAN] = {GIB_ERR_NON_FINITE},
+        [FAULT_LIMIT_LOST] = {GIB_ERR_HOMING_LIMIT, GIB_DONE},
         [FAULT_TORQUE_STUCK] = {GIB_ERR_HOMING_TORQUE_STUCK, GIB_DONE},
         /* Amid the line it bends the line. */
         [FAULT_TORQUE_STUCK_HIGH] = {GIB_ERR_HOMING_TORQUE_STUCK, GIB_ERR_HOMING_SHAPE, GIB_ERR_HOMING_TOUCHES, GIB_DONE},

@@ -64,6 +64,12 @@ void homing_plant_init(homing_plant *p, const homing_plant_config *c)
     }
 }
 
+/* N.m of one unit of the drive's torque, with its sign. */
+static double unit_nm(const homing_plant *p)
+{
+    return p->c.torque_unit_nm != 0.0 ? p->c.torque_unit_nm : 1.0;
+}
+
 void homing_plant_break(homing_plant *p, homing_fault fault)
 {
     p->fault = fault;
@@ -78,6 +84,10 @@ void homing_plant_break(homing_plant *p, homing_fault fault)
         }
     }
     switch (fault) {
+    case FAULT_LIMIT_LOST:
+        p->limit_nm = p->c.torque_limit_nm;
+        p->in.torque_limit = p->limit_nm / fabs(unit_nm(p));
+        break;
     case FAULT_TIGHT_SPOT:
         p->c.tight_mm = p->side[0].y;
         p->c.tight_nm = 8.0;
@@ -204,12 +214,6 @@ static uint32_t flags(homing_fault fault)
     case FAULT_FLAG_UNKNOWN: return 1u << 20;
     default: return 0u;
     }
-}
-
-/* N.m of one unit of the drive's torque, with its sign. */
-static double unit_nm(const homing_plant *p)
-{
-    return p->c.torque_unit_nm != 0.0 ? p->c.torque_unit_nm : 1.0;
 }
 
 static void serve_requests(homing_plant *p)

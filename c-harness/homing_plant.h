@@ -46,6 +46,7 @@ typedef enum {
     FAULT_ENCODER_NAN,
     FAULT_ENCODER_INF,
     FAULT_LIMIT_NAN, /* of the limit in force, as the kernel tells it */
+    FAULT_LIMIT_LOST, /* the drive goes back to its own limit, as after a reset, and tells */
     FAULT_TORQUE_STUCK,
     FAULT_TORQUE_STUCK_HIGH,
     FAULT_TORQUE_INVERTED,

@@ -325,6 +325,11 @@
 #define GIB_ERR_HOMING_SQUARE (-212)
 
 /**
+ * The torque limit in force is no longer the one that homing asked for.
+ */
+#define GIB_ERR_HOMING_LIMIT (-213)
+
+/**
  * The motion does not determine the inertia; the report says which ramp would.
  */
 #define GIB_ERR_INERTIA_EXCITATION (-300)
@@ -2272,7 +2277,9 @@ typedef struct gib_homing_input {
      */
     double torque[2];
     /**
-     * Torque limit in force in the drive now, in the unit of `torque`.
+     * Torque limit in force in the drive now, in the unit of `torque`. From the acknowledgement of its request to the next
+     * such request it must stay within 1 % of what was asked for, else `GIB_ERR_HOMING_LIMIT`; where that request is
+     * `unacknowledged`, any finite number will do.
      */
     double torque_limit;
     /**

@@ -113,6 +113,8 @@ pub const GIB_ERR_HOMING_TORQUE_SIGN: i32 = -210;
 pub const GIB_ERR_HOMING_ENCODER: i32 = -211;
 /// Gantry: the two sides are further apart than the square tolerance.
 pub const GIB_ERR_HOMING_SQUARE: i32 = -212;
+/// The torque limit in force is no longer the one that homing asked for.
+pub const GIB_ERR_HOMING_LIMIT: i32 = -213;
 
 /// The motion does not determine the inertia; the report says which ramp would.
 pub const GIB_ERR_INERTIA_EXCITATION: i32 = -300;
@@ -250,6 +252,7 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_HOMING_TORQUE_SIGN, "the torque's sign is inverted\0"),
     (GIB_ERR_HOMING_ENCODER, "the encoder stands still or jumps\0"),
     (GIB_ERR_HOMING_SQUARE, "the two sides of the gantry are not square\0"),
+    (GIB_ERR_HOMING_LIMIT, "the torque limit in force is no longer the one that homing asked for\0"),
     (GIB_ERR_INERTIA_EXCITATION, "the motion does not determine the inertia\0"),
     (GIB_ERR_INERTIA_FEW, "too little of the motion can be used for the inertia\0"),
     (GIB_ERR_INERTIA_SIGN, "torque and speed have opposite signs\0"),

@@ -13,9 +13,9 @@ use core::ffi::c_void;
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
 const ALIVE: u32 = 0x6769_6821;
 /// The same for an instance at work on two motors.
-const BOTH: u32 = 0x6769_6823;
+const BOTH: u32 = 0x6769_6822;
 /// The same for an instance that has nothing to do but to follow the axis.
-const QUIET: u32 = 0x6769_6822;
+const QUIET: u32 = 0x6769_6823;
 
 /// Homing of one axis, of one motor or two. Opaque; its size is `gib_homing_size()`.
 #[repr(C, align(16))]
@@ -175,30 +175,28 @@ pub unsafe extern "C" fn gib_homing_step(
     // SAFETY: as above, and none is NULL.
     let (handle, input, output) = unsafe { (&mut *handle, &*input, &mut *output) };
     // The cheap cycles, in which an axis spends its life.
-    if handle.alive != ALIVE {
-        if handle.alive != QUIET {
-            return if handle.alive == BOTH {
-                step_both(handle, input, output)
-            } else {
-                step_from_rest(handle, input, output)
-            };
+    match handle.alive {
+        ALIVE if handle.machine.quick(input) => {}
+        ALIVE => return step_unlike(handle, input, output),
+        BOTH => return step_both(handle, input, output),
+        QUIET if placed_well(input) => {
+            *output = *handle.machine.output();
+            output.target_position_mm = input.position_mm;
+            return output.status;
         }
-        let place = input.position_mm;
-        let sum = place[0] + place[1];
-        #[expect(clippy::eq_op, reason = "NaN for NaN and infinity, in the fewest instructions")]
-        let odd = (sum - sum).is_nan();
-        if odd {
-            return step_from_rest(handle, input, output);
-        }
-        *output = *handle.machine.output();
-        output.target_position_mm = place;
-        return output.status;
-    }
-    if !handle.machine.quick(input) {
-        return step_unlike(handle, input, output);
+        _ => return step_from_rest(handle, input, output),
     }
     *output = *handle.machine.output();
     output.status
+}
+
+/// Whether the positions are numbers.
+#[inline(always)]
+#[expect(clippy::eq_op, reason = "NaN for NaN and infinity, in the fewest instructions")]
+fn placed_well(input: &HomingInput) -> bool {
+    let [first, second] = input.position_mm;
+    let sum = first + second;
+    !(sum - sum).is_nan()
 }
 
 /// A cycle at work on two motors. `extern "C"` as below.

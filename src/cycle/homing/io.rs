@@ -59,7 +59,9 @@ pub struct HomingInput {
     pub position_mm: [f64; 2],
     /// Motor torque, positive toward positive positions unless `torque_inverted`, in the unit of the configuration.
     pub torque: [f64; 2],
-    /// Torque limit in force in the drive now, in the unit of `torque`.
+    /// Torque limit in force in the drive now, in the unit of `torque`. From the acknowledgement of its request to the next
+    /// such request it must stay within 1 % of what was asked for, else `GIB_ERR_HOMING_LIMIT`; where that request is
+    /// `unacknowledged`, any finite number will do.
     pub torque_limit: f64,
     /// `request_id` of the last request that the kernel has carried out; 0 before the first.
     pub acknowledged_id: u32,

@@ -86,6 +86,8 @@ pub struct Homing {
     stopped: bool,
     /// Torque limit in force at the start.
     old_limit: f64,
+    /// The limit in force as it was told last, in bits, which differ where a number is none.
+    in_force: u64,
     /// True while the drive runs with a limit that gib has changed and not put right.
     changed: bool,
     output: HomingOutput,
@@ -111,6 +113,7 @@ impl Default for Homing {
             pressed_apart: 0.0,
             stopped: false,
             old_limit: 0.0,
+            in_force: 0,
             changed: false,
             output: HomingOutput::default(),
             sides: [Side::default(), Side::default()],
@@ -143,6 +146,7 @@ impl Homing {
         self.output.new_events = 0;
         self.output.shift_mm = [0.0; 2];
         self.output.stop_drive = 0;
+        self.in_force = 0;
         self.enter(Phase::Begin, 2.0);
         Ok(())
     }
@@ -216,7 +220,8 @@ impl Homing {
     #[inline(always)]
     pub fn quick(&mut self, input: &HomingInput) -> bool {
         let [side, _] = &mut self.sides;
-        let done = side.quick(&self.plan, input.position_mm[0], input.torque[0], input.flags);
+        let odd = u64::from(input.flags) | (input.torque_limit.to_bits() ^ self.in_force);
+        let done = side.quick(&self.plan, input.position_mm[0], input.torque[0], odd);
         if done {
             self.output.target_position_mm[0] = side.profile.position;
         }
@@ -227,7 +232,8 @@ impl Homing {
     #[inline(always)]
     pub fn quick_slow(&mut self, input: &HomingInput) -> bool {
         let [side, _] = &mut self.sides;
-        let done = side.quick_slow(&self.plan, input.position_mm[0], input.torque[0], input.flags);
+        let odd = u64::from(input.flags) | (input.torque_limit.to_bits() ^ self.in_force);
+        let done = side.quick_slow(&self.plan, input.position_mm[0], input.torque[0], odd);
         if done {
             self.output.target_position_mm[0] = side.profile.position;
             self.output.target_speed_mm_s[0] = side.profile.speed * self.plan.cycles_per_s;
@@ -270,9 +276,8 @@ impl Homing {
         self.now += 1;
         if let Some(fault) = self.danger(input) {
             self.leave(fault);
-        } else if !input.torque_limit.is_finite() {
-            let (field, value) = ("torque_limit\0", input.torque_limit);
-            self.leave_by(Fault { field, value, ..Fault::of(GIB_ERR_NON_FINITE) }, false);
+        } else if let Some(fault) = self.lost_limit(input.torque_limit) {
+            self.leave_by(fault, false);
         } else if self.now >= self.deadline {
             self.overdue();
         } else {
@@ -282,6 +287,27 @@ impl Homing {
             if self.phase == Phase::Touch { self.touch() } else { self.advance(input) }
         }
         self.command();
+    }
+
+    /// What is wrong with the torque limit in force, as the kernel tells it, if anything. Once asked for it must stay.
+    #[inline(always)]
+    fn lost_limit(&mut self, told: f64) -> Option<Fault> {
+        let same = self.in_force == told.to_bits();
+        self.in_force = told.to_bits();
+        if same { None } else { self.name_lost_limit(told) }
+    }
+
+    #[cold]
+    fn name_lost_limit(&self, told: f64) -> Option<Fault> {
+        let fault = |code, low, high| Some(Fault { code, field: "torque_limit\0", value: told, low, high });
+        let changes = matches!(self.phase, Phase::Begin | Phase::Limit | Phase::Set);
+        if !told.is_finite() {
+            fault(GIB_ERR_NON_FINITE, f64::MIN, f64::MAX)
+        } else if changes || self.plan.acknowledged & GIB_HOMING_REQUEST_TORQUE_LIMIT == 0 || self.limited(told) {
+            None
+        } else {
+            fault(GIB_ERR_HOMING_LIMIT, 0.99 * self.plan.limit, 1.01 * self.plan.limit)
+        }
     }
 
     /// Puts the commands out.

@@ -161,8 +161,14 @@ impl Side {
         // One jump is no noise.
         self.rough += ROUGH_GAIN * (lower(bend.abs(), 0.5 * plan.limit) - self.rough);
         self.change = change;
+        self.watch(position, torque);
         self.reading = torque;
-        if change == 0.0 {
+    }
+
+    /// Takes note of whether the torque reading is alive.
+    #[inline(always)]
+    fn watch(&mut self, position: f64, torque: f64) {
+        if torque == self.reading {
             self.same = self.same.saturating_add(1);
         } else {
             self.same = 0;

@@ -7,7 +7,7 @@
 //! pressed ([`Homing::quick_both_slow`]).
 
 use super::*;
-use crate::cycle::homing::side::{Caught, GAIN, RIGID, RIGID_AFTER_TURN, ROUGH_GAIN, UNDER_WAY};
+use crate::cycle::homing::side::{Caught, GAIN, RIGID, RIGID_AFTER_TURN, UNDER_WAY};
 use wide::f64x2;
 
 /// What usual cycles need of the motors, one a lane, lent by the sides.
@@ -17,8 +17,6 @@ pub struct Usual {
     cruise: i32,
     slow: u32,
     granted: u32,
-    /// Whether some were at constant speed.
-    cruises: bool,
     /// Every motor stands pressed and its command has ended.
     stands: bool,
     /// Every cycle is a block of the traces, of the same place where there are two; none are kept.
@@ -36,6 +34,9 @@ pub struct Usual {
     drift: f64x2,
     middle: f64x2,
     band: f64x2,
+    /// Torque readings that have changed in the slow cycles, and where.
+    alive: f64x2,
+    changed_at: f64x2,
     /// The lag about which cycles at constant speed count as usual, and by how much it may differ: between two such lags the
     /// position changes by no more than a jump, nor goes beyond the end. Of motors that stand, how far from their anchors.
     lag: f64x2,
@@ -62,12 +63,6 @@ struct Rest {
     goal: f64x2,
     speed_max: f64x2,
     braking: f64x2,
-    change: f64x2,
-    rough: f64x2,
-    rough_most: f64x2,
-    same: f64x2,
-    same_way: f64x2,
-    changed_at: f64x2,
     /// What stood when the position changed last, and since when it does not.
     free: f64x2,
     free_reading: f64x2,
@@ -92,15 +87,6 @@ fn lanes(of: impl FnMut(usize) -> f64) -> f64x2 {
 
 fn mask(mut of: impl FnMut(usize) -> bool) -> f64x2 {
     lanes(|i| f64::from_bits(if of(i) { u64::MAX } else { 0 }))
-}
-
-/// Whether a limit is positive and finite, from the upper half of its bits: of all numbers, those have the lowest.
-#[inline(always)]
-fn sound(limit: f64) -> bool {
-    /// More than any limit. A half that does not end in zeros takes an instruction less.
-    const MOST: f64 = 1e300;
-    let upper = |number: f64| (number.to_bits() >> 32) as u32;
-    upper(limit) < upper(MOST)
 }
 
 impl Usual {
@@ -133,6 +119,14 @@ impl Usual {
         }
     }
 
+    /// Takes note of which torque readings are alive, as [`Side::sense`].
+    #[inline(always)]
+    fn watch(&mut self, position: f64x2, torque: f64x2) {
+        let changed = torque.simd_ne(self.reading);
+        self.alive |= changed;
+        self.changed_at = changed.bitselect(position, self.changed_at);
+    }
+
     /// Where the readings keep every bound.
     #[inline(always)]
     fn bounded(&self, position: f64x2, filtered: f64x2, target: f64x2) -> f64x2 {
@@ -148,10 +142,10 @@ impl Usual {
             & filtered.abs().simd_le(self.band)
     }
 
-    /// Where the encoder goes on, as in the cycle before.
+    /// Where the encoder goes on, as in the cycle before, and nothing is pressed on.
     #[inline(always)]
     fn moves(&self, position: f64x2) -> f64x2 {
-        position.simd_ne(self.position) & self.rest.frozen.simd_eq(f64x2::ZERO)
+        position.simd_ne(self.position) & self.rest.frozen.simd_eq(f64x2::ZERO) & !self.rest.held
     }
 
     /// For how many cycles encoders stand, and the filtered torque and the reading before, as in [`Side::sense`].
@@ -165,11 +159,11 @@ impl Usual {
 
     /// Where an encoder that stands is not at fault, as in [`Side::rigid`], and nothing ends a press.
     #[inline(always)]
-    fn sane(&self, position: f64x2, torque: f64x2, filtered: f64x2, standing: &(f64x2, f64x2, f64x2)) -> f64x2 {
+    fn sane(&self, position: f64x2, filtered: f64x2, standing: &(f64x2, f64x2, f64x2)) -> f64x2 {
         let (rest, (frozen, free, _)) = (&self.rest, *standing);
         let most = (position - rest.from).abs().simd_gt(rest.turn).bitselect(rest.under_way, rest.turning);
         let patient = frozen.simd_le(rest.frozen_limit) & (filtered - free).abs().simd_le(most);
-        (patient | frozen.simd_eq(f64x2::ZERO)) & (!rest.held | rest.presses(position, torque.simd_eq(self.reading)))
+        (patient | frozen.simd_eq(f64x2::ZERO)) & (!rest.held | rest.presses(position))
     }
 
     /// Puts the usual lags about this cycle's. While an encoder stands no lag is: that is not for [`Homing::quick_both`].
@@ -198,7 +192,8 @@ impl Usual {
         let of = |lanes: f64x2| lanes.to_array()[i & 1];
         Caught {
             cycles: self.gone(),
-            cruises: self.cruises,
+            alive: of(self.alive).to_bits() != 0,
+            changed_at: of(self.changed_at),
             frozen: of(self.rest.frozen) as u32,
             position: of(self.position),
             reading: of(self.reading),
@@ -206,10 +201,6 @@ impl Usual {
             lowest: of(self.lowest + self.middle),
             sliding: of(self.sliding + self.middle),
             free: [of(self.rest.free_reading), of(self.rest.free + self.middle)],
-            change: of(self.rest.change),
-            rough: of(self.rest.rough),
-            same: of(self.rest.same) as u32,
-            changed_at: of(self.rest.changed_at),
             target,
             speed: of(self.speed),
         }
@@ -217,22 +208,10 @@ impl Usual {
 }
 
 impl Rest {
-    /// Whether a motor that is pressed stands, and not for long under the very same torque, as [`Side::press`].
+    /// Whether a motor that is pressed stands, as [`Side::press`].
     #[inline(always)]
-    fn presses(&self, position: f64x2, same: f64x2) -> f64x2 {
-        let alive = !same | (position - self.changed_at).abs().simd_le(self.same_way);
-        alive & (position - self.anchor).abs().simd_le(self.standing_way)
-    }
-
-    /// How the torque changes, as [`Side::hear`].
-    #[inline(always)]
-    fn hear(&mut self, position: f64x2, torque: f64x2, reading: f64x2) {
-        let change = torque - reading;
-        let same = change.simd_eq(f64x2::ZERO);
-        self.same = (self.same + 1.0) & same;
-        self.changed_at = same.bitselect(self.changed_at, position);
-        self.rough += ((change - self.change).abs().fast_min(self.rough_most) - self.rough) * ROUGH_GAIN;
-        self.change = change;
+    fn presses(&self, position: f64x2) -> f64x2 {
+        (position - self.anchor).abs().simd_le(self.standing_way)
     }
 
     /// Which commands are at constant speed, as [`crate::cycle::profile::Profile::cruises`].
@@ -278,7 +257,6 @@ impl Homing {
             cruise: cruise as i32,
             slow: cycles - cruise,
             granted: cycles,
-            cruises: cruise > 0,
             even: traces[0].even_with(traces[1]),
             paused: traces.iter().all(|trace| trace.paused()),
             speed: lanes(|i| sides[i].profile.speed),
@@ -292,6 +270,8 @@ impl Homing {
             middle,
             band: lanes(|i| 0.5 * (ahead[i].high - ahead[i].low)),
             stands: false,
+            alive: f64x2::ZERO,
+            changed_at: lanes(|i| sides[i].position),
             lag: f64x2::ZERO,
             lag_band: f64x2::ZERO,
             rest: Rest {
@@ -306,17 +286,11 @@ impl Homing {
                 braking: lanes(|i| sides[i].profile.braking()),
                 free: lanes(|i| sides[i].free[1]) - middle,
                 free_reading: lanes(|i| sides[i].free[0]),
-                change: lanes(|i| sides[i].change),
-                rough: lanes(|i| sides[i].rough),
-                same: lanes(|i| f64::from(sides[i].same)),
-                changed_at: lanes(|i| sides[i].changed_at),
                 lag_limit: f64x2::splat(plan.lag_limit),
                 jump: f64x2::splat(plan.jump),
                 distance: f64x2::splat(plan.distance[1]),
                 acceleration: f64x2::splat(plan.acceleration),
                 standing_way: f64x2::splat(plan.standing_way),
-                rough_most: f64x2::splat(0.5 * plan.limit),
-                same_way: f64x2::splat(0.25 * plan.retract),
                 from: lanes(|i| sides[i].from),
                 turn: f64x2::splat(UNDER_WAY * plan.retract),
                 turning: f64x2::splat(0.5 * RIGID_AFTER_TURN * plan.limit),
@@ -326,7 +300,7 @@ impl Homing {
                 apart: square,
             },
         };
-        let stands = |side: &Side| side.held && !side.goes_on(plan) && side.reads_on(plan);
+        let stands = |side: &Side| side.held && !side.goes_on(plan);
         let target = lanes(|i| sides[i].profile.position);
         if sides.iter().all(stands) {
             self.usual.stand(target);
@@ -361,7 +335,7 @@ impl Homing {
         let u = &mut self.usual;
         // Counted down first: that takes the fewest instructions.
         u.cruise -= 1;
-        if u.cruise < 0 || !sound(input.torque_limit) {
+        if u.cruise < 0 || input.torque_limit.to_bits() != self.in_force {
             return false;
         }
         let (position, torque) = (f64x2::new(input.position_mm), f64x2::new(input.torque));
@@ -387,7 +361,7 @@ impl Homing {
     pub fn quick_both_slow(&mut self, input: &HomingInput, output: &mut HomingOutput) -> bool {
         let u = &mut self.usual;
         u.cruise += 1;
-        if u.cruise as u32 + u.slow == 0 || input.flags != 0 || !sound(input.torque_limit) {
+        if u.cruise as u32 + u.slow == 0 || input.flags != 0 || input.torque_limit.to_bits() != self.in_force {
             return false;
         }
         let (position, torque) = (f64x2::new(input.position_mm), f64x2::new(input.torque));
@@ -399,7 +373,7 @@ impl Homing {
                 return false;
             }
             u.slow -= 1;
-            u.rest.hear(position, torque, u.reading);
+            u.watch(position, torque);
             (u.position, u.reading, u.filtered) = (position, torque, filtered);
             *output = self.output;
             return true;
@@ -408,15 +382,15 @@ impl Homing {
         if !all(u.bounded(position, filtered, target)) {
             return false;
         }
+        u.watch(position, torque);
         // At constant speed it may be that nothing but the lag has left its band.
         let moves = all(u.moves(position));
-        if !(cruises && moves) {
+        if !moves {
             let standing = u.standing(position);
-            if !all(u.sane(position, torque, filtered, &standing)) {
+            if !all(u.sane(position, filtered, &standing)) {
                 return false;
             }
             (u.rest.frozen, u.rest.free, u.rest.free_reading) = standing;
-            u.rest.hear(position, torque, u.reading);
         }
         if cruises {
             u.cruise -= 1;

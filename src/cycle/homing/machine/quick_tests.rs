@@ -13,6 +13,7 @@ enum Wrong {
     PositionNan,
     TorqueNan,
     LimitNan,
+    LimitRises,
     Drive,
     Abort,
     AbortCall,
@@ -28,11 +29,12 @@ enum Wrong {
     NoAnswer,
 }
 
-const WRONG: [Wrong; 17] = [
+const WRONG: [Wrong; 18] = [
     Wrong::Nothing,
     Wrong::PositionNan,
     Wrong::TorqueNan,
     Wrong::LimitNan,
+    Wrong::LimitRises,
     Wrong::Drive,
     Wrong::Abort,
     Wrong::AbortCall,
@@ -196,6 +198,7 @@ impl Axis {
             Wrong::PositionNan => *position = f64::NAN,
             Wrong::TorqueNan => *torque = f64::INFINITY,
             Wrong::LimitNan => input.torque_limit = f64::NAN,
+            Wrong::LimitRises => input.torque_limit *= 1.5,
             Wrong::Drive => input.flags = 1,
             Wrong::Abort => input.flags = GIB_INPUT_ABORT,
             Wrong::Frozen => *position = *self.frozen.get_or_insert(*position),

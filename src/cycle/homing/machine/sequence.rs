@@ -429,9 +429,13 @@ impl Homing {
         let wanted = self.output.requests & self.plan.acknowledged;
         let limits = wanted & GIB_HOMING_REQUEST_TORQUE_LIMIT != 0;
         wanted == 0
-            || (input.acknowledged_id == self.output.request_id
-                && (!limits
-                    || (input.torque_limit - self.output.torque_limit).abs() <= 0.01 * self.output.torque_limit.abs()))
+            || (input.acknowledged_id == self.output.request_id && (!limits || self.limited(input.torque_limit)))
+    }
+
+    /// Whether the limit in force is the one asked for, within a hundredth.
+    #[inline(always)]
+    pub(super) fn limited(&self, told: f64) -> bool {
+        (told - self.output.torque_limit).abs() <= 0.01 * self.output.torque_limit.abs()
     }
 
     /// Tells an event, once.

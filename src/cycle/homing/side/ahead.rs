@@ -20,7 +20,8 @@ pub struct Ahead {
 #[expect(missing_docs, reason = "named as in Side")]
 pub struct Caught {
     pub cycles: u32,
-    pub cruises: bool,
+    pub alive: bool,
+    pub changed_at: f64,
     pub frozen: u32,
     pub position: f64,
     pub reading: f64,
@@ -28,10 +29,6 @@ pub struct Caught {
     pub lowest: f64,
     pub sliding: f64,
     pub free: [f64; 2],
-    pub change: f64,
-    pub rough: f64,
-    pub same: u32,
-    pub changed_at: f64,
     pub target: f64,
     pub speed: f64,
 }
@@ -55,6 +52,7 @@ impl Side {
             };
             let to_next = next.saturating_sub(self.standing + 1);
             let cycles = if self.goes_on(plan) { to_next.min(ahead.cycles) } else { to_next };
+            let cycles = if self.reads_on(plan) { cycles } else { 0 };
             return Ahead { cycles, low: plan.release, high: plan.bound, ..ahead };
         }
         if !p.cruises() {
@@ -75,30 +73,25 @@ impl Side {
         if self.held {
             self.standing += caught.cycles;
         }
-        (self.same, self.changed_at) = if !caught.cruises {
-            (caught.same, caught.changed_at)
-        } else if self.reading == caught.reading {
-            // At constant speed nobody looks whether the torque changes from one cycle to the next.
-            (self.same.saturating_add(caught.cycles), self.changed_at)
-        } else {
-            (0, caught.position)
-        };
         self.frozen = caught.frozen;
         self.position = caught.position;
+        // At constant speed nobody looks whether the torque changes from one cycle to the next.
+        (self.same, self.changed_at) = match () {
+            () if caught.alive => (0, caught.changed_at),
+            () if caught.reading != self.reading => (0, caught.position),
+            () => (self.same.saturating_add(caught.cycles), self.changed_at),
+        };
         self.reading = caught.reading;
         self.filtered = caught.filtered;
         self.lowest = caught.lowest;
         self.sliding = caught.sliding;
         self.free = caught.free;
-        self.change = caught.change;
-        self.rough = caught.rough;
         self.profile.position = caught.target;
         self.profile.speed = caught.speed;
     }
 
     /// Whether a torque that no longer changed would, within the way of a standing axis, not be taken for a stuck one.
-    #[must_use]
-    pub fn reads_on(&self, plan: &Plan) -> bool {
+    pub(super) fn reads_on(&self, plan: &Plan) -> bool {
         (self.anchor - self.changed_at).abs() + plan.standing_way <= 0.25 * plan.retract
     }
 

@@ -9,7 +9,7 @@ impl Side {
     /// alive, all within bounds. False when it is not: [`Side::quick_slow`] must follow. The bounds are those of [`Side::safe`];
     /// those of way and time are in `cruise`, those of lag and jump in `lag_band`.
     #[inline(always)]
-    pub fn quick(&mut self, plan: &Plan, position: f64, torque: f64, flags: u32) -> bool {
+    pub fn quick(&mut self, plan: &Plan, position: f64, torque: f64, odd: u64) -> bool {
         let filtered = (1.0 - GAIN) * self.filtered + plan.torque_share * torque;
         let lag = self.profile.position - position;
         // Counted down first: that takes the fewest instructions. Written so that a NaN is not usual.
@@ -17,7 +17,7 @@ impl Side {
         let usual = self.cruise >= 0
             && (lag - self.usual_lag).abs() <= self.lag_band
             && position != self.position
-            && flags == 0
+            && odd == 0
             && filtered > plan.bound_below
             && !(filtered >= self.trip);
         if usual {
@@ -30,11 +30,11 @@ impl Side {
     /// The same where the command speeds up or brakes, the motor sticks, or it stands pressed. Comes after a
     /// [`Side::quick`] that was false, and takes back what that has counted.
     #[inline(always)]
-    pub fn quick_slow(&mut self, plan: &Plan, position: f64, torque: f64, flags: u32) -> bool {
+    pub fn quick_slow(&mut self, plan: &Plan, position: f64, torque: f64, odd: u64) -> bool {
         self.cruise += 1;
         let filtered = (1.0 - GAIN) * self.filtered + plan.torque_share * torque;
         if self.cruise > 0 {
-            return self.quick_lag(plan, position, torque, filtered, flags);
+            return self.quick_lag(plan, position, torque, filtered, odd);
         }
         let goes_on = if self.held {
             (position - self.anchor).abs() <= plan.standing_way
@@ -42,7 +42,7 @@ impl Side {
             (position != self.position) != (self.frozen > 0)
         };
         let usual = self.slow != 0
-            && flags == 0
+            && odd == 0
             && self.safe(plan, position, torque)
             && filtered > self.low
             && filtered < self.high
@@ -51,7 +51,7 @@ impl Side {
             return false;
         }
         self.slow -= 1;
-        self.hear(plan, position, torque);
+        self.watch(position, torque);
         self.take_in(position, torque, filtered);
         if !self.held || self.standing < plan.hold {
             self.profile.step();
@@ -62,8 +62,8 @@ impl Side {
     /// The same where the command goes on at its speed and only the lag has left its band: it counts as usual from now on,
     /// where it is within all bounds.
     #[inline(always)]
-    fn quick_lag(&mut self, plan: &Plan, position: f64, torque: f64, filtered: f64, flags: u32) -> bool {
-        let usual = flags == 0
+    fn quick_lag(&mut self, plan: &Plan, position: f64, torque: f64, filtered: f64, odd: u64) -> bool {
+        let usual = odd == 0
             && self.safe(plan, position, torque)
             && filtered > plan.bound_below
             && filtered < self.trip
@@ -138,7 +138,8 @@ impl Side {
         if self.held {
             (self.low, self.high) = (plan.release, plan.bound);
             let next = if self.standing < plan.hold { plan.hold } else { plan.detection };
-            self.granted = next.saturating_sub(self.standing + 1).min(left);
+            let reads_on = u32::from(self.reads_on(plan));
+            self.granted = reads_on * next.saturating_sub(self.standing + 1).min(left);
         } else if self.frozen > 0 {
             // Within this no encoder is at fault, see `rigid`.
             let most = 0.5 * RIGID * plan.limit;
