@@ -4,7 +4,8 @@
 //! over shorter and shorter times.
 
 use super::causes::Law;
-use super::fit::{Bench, Fit, Part, dot, figure};
+use super::fit::{Bench, Fit, Part, figure};
+use super::many::dot;
 
 /// Times over which rows are summed, s, and how far apart the points of a slope are, in steps of each scale.
 const STAGES: [(f64, f64); 3] = [(0.05, 12.0), (0.02, 8.0), (0.006, 4.0)];

@@ -1,6 +1,7 @@
 //! Contiguous blocks, on which what is fitted without them is judged: neighbouring rows are not independent, blocks nearly so.
 
-use super::fit::{Bench, Fit, dot};
+use super::fit::{Bench, Fit};
+use super::many::dot;
 use std::ops::Range;
 
 /// The frame's blocks, cut further where one holds more than a share `most` of one of these traces: what happens in one place,

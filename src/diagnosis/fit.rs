@@ -11,6 +11,7 @@ pub use slopes::Slope;
 
 use super::causes::{Law, Rest, Term, Trace};
 use super::frame::Frame;
+use super::many::{add, dot};
 use crate::plant::linear::decomposed;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -145,7 +146,7 @@ impl<'f, 'a> Bench<'f, 'a> {
         let mut target: Vec<f64> = Vec::with_capacity(basis.len());
         for direction in &basis {
             let along = dot(direction, &residual);
-            residual.iter_mut().zip(direction).for_each(|(r, d)| *r -= along * d);
+            add(&mut residual, -along, direction);
             target.push(along);
         }
         let count = triangle.len();
@@ -169,7 +170,7 @@ impl<'f, 'a> Bench<'f, 'a> {
             let mut c = column.to_vec();
             for direction in fit.basis.iter().chain(own) {
                 let along = dot(direction, &c);
-                c.iter_mut().zip(direction).for_each(|(c, d)| *c -= along * d);
+                add(&mut c, -along, direction);
             }
             c
         };
@@ -187,7 +188,7 @@ impl<'f, 'a> Bench<'f, 'a> {
                 let scale = length.sqrt().recip();
                 c.iter_mut().for_each(|c| *c *= scale);
                 let along = dot(&c, &residual);
-                residual.iter_mut().zip(&c).for_each(|(r, d)| *r -= along * d);
+                add(&mut residual, -along, &c);
                 own.push(c);
             }
         }
@@ -358,19 +359,6 @@ pub fn pseudo_inverse(matrix: DMatrix<f64>, least: f64) -> Option<DMatrix<f64>> 
     decomposed(matrix)?.pseudo_inverse(least).ok()
 }
 
-/// Scalar product.
-#[must_use]
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (mut sums, a8, b8) = ([0.0; 4], a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in a8.zip(b8) {
-        for k in 0..4 {
-            sums[k] += x[k] * y[k];
-        }
-    }
-    sums.iter().sum::<f64>() + rest
-}
-
 /// The part of a column that stands on the basis, with unit length, and its weights on basis and itself. A column that
 /// the basis already spans gives a zero column.
 fn orthonormal(column: &[f64], basis: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
@@ -379,7 +367,7 @@ fn orthonormal(column: &[f64], basis: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
     for _ in 0..2 {
         for (direction, weight) in basis.iter().zip(&mut weights) {
             let along = dot(direction, &c);
-            c.iter_mut().zip(direction).for_each(|(c, d)| *c -= along * d);
+            add(&mut c, -along, direction);
             *weight += along;
         }
     }

@@ -8,7 +8,8 @@
 //! taken off before any dead time is looked for.
 
 use super::filter::{LowPass, convolve, norm, of_three};
-use super::fit::dot;
+use super::many::{decay, product, widest};
+use super::rows::{direction_of, doubtful_rows, judged_rows, resting_rows};
 use super::sampling::{NUMEROV, Sampling};
 use crate::machine::{Axis, Belief, Effect};
 use crate::plant::lateness::Lateness;
@@ -40,8 +41,6 @@ pub struct Columns {
     pub left_out: usize,
 }
 
-/// Most rows on which causes are compared; more are thinned evenly, which costs time and gains nothing.
-const MOST_KEPT: usize = 12_000;
 /// Rows of less weight are not judged: nothing is known of their friction.
 const LEAST_WEIGHT: f64 = 0.05;
 /// Share of the top speed at which an axis creeps: what dry friction does there depends on the formulation (a step, bristles,
@@ -205,14 +204,43 @@ impl<'a> Frame<'a> {
         self.weighed(values, &self.low_pass_kernel, 0)
     }
 
+    /// The same of several columns side by side.
+    #[must_use]
+    pub fn low_passed_together<const N: usize>(&self, values: &[[f64; N]]) -> [Vec<f64>; N] {
+        let kernel = &self.low_pass_kernel;
+        let mut columns: [Vec<f64>; N] = std::array::from_fn(|_| Vec::with_capacity(self.kept.len()));
+        widest(
+            #[inline(always)]
+            || {
+                for &row in &self.kept {
+                    let window =
+                        row.checked_sub(kernel.len() / 2).and_then(|from| values.get(from..from + kernel.len()));
+                    let mut sums = [0.0; N];
+                    for (value, weight) in window.unwrap_or_default().iter().zip(kernel) {
+                        for (sum, value) in sums.iter_mut().zip(value) {
+                            *sum += weight * value;
+                        }
+                    }
+                    columns.iter_mut().zip(sums).for_each(|(column, sum)| column.push(sum));
+                }
+            },
+        );
+        columns
+    }
+
     /// Weighted sum of the rows about each judged row, `offset` rows later. The rows that are not judged are not worked out.
     fn weighed(&self, values: &[f64], kernel: &[f64], offset: isize) -> Vec<f64> {
         let first = offset - (kernel.len() / 2) as isize;
-        let at = |&row: &usize| {
-            let begin = row.saturating_add_signed(first);
-            values.get(begin..begin + kernel.len()).map_or(0.0, |window| dot(window, kernel))
-        };
-        self.kept.iter().map(at).collect()
+        widest(
+            #[inline(always)]
+            || {
+                let at = |&row: &usize| {
+                    let begin = row.saturating_add_signed(first);
+                    values.get(begin..begin + kernel.len()).map_or(0.0, |window| product(window, kernel))
+                };
+                self.kept.iter().map(at).collect()
+            },
+        )
     }
 
     /// table − encoder at the judged rows; empty without a table scale.
@@ -241,6 +269,17 @@ impl<'a> Frame<'a> {
     #[must_use]
     pub fn judged_by(&self, value: impl Fn(usize) -> f64) -> Vec<f64> {
         self.judged(&(0..self.x.len()).map(value).collect::<Vec<_>>())
+    }
+
+    /// Dry friction that fades where a function of the row is large: direction·e^−function.
+    #[must_use]
+    pub fn fading(&self, function: impl Fn(usize) -> f64) -> Vec<f64> {
+        let mut friction: Vec<f64> = (0..self.x.len()).map(function).collect();
+        widest(
+            #[inline(always)]
+            || friction.iter_mut().zip(&self.direction).for_each(|(f, direction)| *f = direction * decay(*f)),
+        );
+        self.judged(&friction)
     }
 
     /// The measured torque at the judged rows, if the column is late by `late_s` beyond what is known. What a delay has
@@ -375,88 +414,7 @@ fn fit_width(bend_noise: f64, torque_noise: f64) -> usize {
     81
 }
 
-/// Rows at which the axis rests as far as the encoder can tell: no step for some rows, and no travel around them.
-fn resting_rows(columns: &Columns, resolution: f64) -> Vec<bool> {
-    let x = &columns.position;
-    let mut resting = vec![false; x.len()];
-    for s in &columns.stretches {
-        let mut run = s.start;
-        for i in s.start..s.end {
-            let (a, b) = (i.saturating_sub(1).max(s.start), (i + 1).min(s.end - 1));
-            let still = (x[b] - x[a]).abs() < 1.5 * resolution;
-            let ends = !still || i + 1 == s.end;
-            if ends {
-                let end = if still { i + 1 } else { i };
-                if end >= run + 3 {
-                    let net = (x[end - 1] - x[run]).abs();
-                    for r in run..end {
-                        let around = &x[r.saturating_sub(6).max(s.start)..(r + 7).min(s.end)];
-                        let low = around.iter().copied().fold(f64::MAX, f64::min);
-                        let high = around.iter().copied().fold(f64::MIN, f64::max);
-                        resting[r] = net < 3.0 * resolution || high - low < 3.0 * resolution;
-                    }
-                }
-                run = i + 1;
-            }
-        }
-    }
-    resting
-}
-
-/// Mean sign of the speed over each row. Through a fast reversal the crossing is found between rows from speed and
-/// acceleration; in slow motion the direction is that of the last resolved step.
-fn direction_of(columns: &Columns, v: &[f64], a: &[f64], resolution: f64) -> Vec<f64> {
-    let (x, h) = (&columns.position, columns.period_s);
-    let mut out = vec![0.0; x.len()];
-    for s in &columns.stretches {
-        for i in s.clone() {
-            let (before, after) = (i.saturating_sub(1).max(s.start), (i + 1).min(s.end - 1));
-            let step = x[after] - x[before];
-            let half = (0.5 * h * a[i].abs()).max(0.1 * resolution / h);
-            let smooth = (v[i] / half).clamp(-1.0, 1.0);
-            // A step that the grid cannot fake decides; the smoothed speed only places the crossing.
-            out[i] = if step.abs() > 2.5 * resolution && smooth * step < 0.0 { step.signum() } else { smooth };
-        }
-    }
-    out
-}
-
-/// How far the direction of friction is open at each row, 0 to 1: at rest, and at a turn as long as the encoder shows no way
-/// back, since the axis may stick there for a moment.
-fn doubtful_rows(columns: &Columns, resting: Vec<bool>, resolution: f64) -> Vec<f64> {
-    let x = &columns.position;
-    let mut doubt: Vec<f64> = resting.into_iter().map(|r| f64::from(u8::from(r))).collect();
-    for s in &columns.stretches {
-        for turn in crate::analysis::motion::turning_points(&x[s.clone()], 3.0 * resolution) {
-            let turn = s.start + turn;
-            let near = |i: usize| (x[i] - x[turn]).abs() < 2.5 * resolution;
-            let mut first = turn.saturating_sub(1).max(s.start);
-            while first > s.start && near(first - 1) {
-                first -= 1;
-            }
-            let mut last = (turn + 1).min(s.end - 1);
-            while last + 1 < s.end && near(last + 1) {
-                last += 1;
-            }
-            doubt[first..=last].fill(1.0);
-        }
-    }
-    doubt
-}
-
 /// Root mean square.
 fn typical(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
-}
-
-/// Rows away from the ends of their stretch, thinned to the filter's own density, that carry weight.
-fn judged_rows(columns: &Columns, margin: usize, stride: usize, carries: impl Fn(usize) -> bool) -> Vec<usize> {
-    let mut kept = Vec::new();
-    for s in &columns.stretches {
-        if s.len() > 4 * margin {
-            kept.extend((s.start + margin..s.end - margin).step_by(stride).filter(|&row| carries(row)));
-        }
-    }
-    let thin = kept.len().div_ceil(MOST_KEPT).max(1);
-    kept.into_iter().step_by(thin).collect()
 }

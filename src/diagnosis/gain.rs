@@ -75,15 +75,19 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
         Self { axis, bench, watch, observed, half }
     }
 
+    /// Errors of the belief alone; `None` where nothing can be predicted.
+    #[must_use]
+    pub fn believed(&self) -> Option<Errors> {
+        errors(self.axis, self.observed.as_ref()?)
+    }
+
     /// Errors of the belief with a set of causes; `None` where nothing can be predicted.
     ///
     /// # Errors
     /// [`Stopped`] when the watch's caller said so.
     pub fn errors(&self, fit: &Fit) -> Result<Option<Errors>, Stopped> {
         let Some(observed) = &self.observed else { return Ok(None) };
-        // Without a cause both halves are the belief.
-        let halves = if fit.parts.is_empty() { 0..1 } else { 0..2 };
-        let machines: Vec<Axis> = halves.map(|half| fitted_without(self.axis, self.bench, fit, half)).collect();
+        let machines: Vec<Axis> = (0..2).map(|half| fitted_without(self.axis, self.bench, fit, half)).collect();
         let of_half = self.watch.each(&machines, (0.92, 0.99), "measuring the gain", |axis| errors(axis, observed))?;
         let (Some(Some(even)), Some(Some(odd))) = (of_half.first(), of_half.last()) else { return Ok(None) };
         Ok(Some(std::array::from_fn(|channel| {

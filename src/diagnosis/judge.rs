@@ -54,18 +54,11 @@ pub struct Judged {
 
 impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     /// A judge of what is found on a bench about an axis; `whole` is the recording, every row.
-    ///
-    /// # Errors
-    /// [`Stopped`] when the watch's caller said so.
-    pub fn new(
-        axis: &'j Axis,
-        whole: &Columns,
-        bench: &'j Bench<'f, 'a>,
-        watch: &'j Watch<'j>,
-    ) -> Result<Self, Stopped> {
+    #[must_use]
+    pub fn new(axis: &'j Axis, whole: &Columns, bench: &'j Bench<'f, 'a>, watch: &'j Watch<'j>) -> Self {
         let (held_out, empty) = (HeldOut::new(axis, whole, bench, watch), bench.fit(Vec::new()));
-        let believed = held_out.errors(&empty)?;
-        Ok(Self { bench, held_out, empty, believed })
+        let believed = held_out.believed();
+        Self { bench, held_out, empty, believed }
     }
 
     /// Judges a set of causes.

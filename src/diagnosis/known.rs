@@ -6,8 +6,8 @@
 //! leave, and their amplitude is the believed one.
 
 use super::causes::{Trace, law, table_side};
-use super::fit::dot;
 use super::frame::Frame;
+use super::many::dot;
 use crate::machine::{Axis, Effect};
 use nalgebra::{Matrix3, Vector3};
 

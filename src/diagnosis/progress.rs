@@ -49,6 +49,25 @@ impl<'p> Watch<'p> {
         if self.stopped.load(Ordering::Relaxed) { Err(Stopped) } else { Ok(()) }
     }
 
+    /// Does two things at a time.
+    ///
+    /// # Errors
+    /// [`Stopped`] when the caller said so.
+    pub fn both<A: Send, B>(
+        &self,
+        one: impl FnOnce() -> Result<A, Stopped> + Send,
+        other: impl FnOnce() -> Result<B, Stopped>,
+    ) -> Result<(A, B), Stopped> {
+        std::thread::scope(|scope| {
+            let one = scope.spawn(one);
+            let other = other();
+            match one.join() {
+                Ok(one) => Ok((one?, other?)),
+                Err(panic) => std::panic::resume_unwind(panic),
+            }
+        })
+    }
+
     /// Runs a function over items on the cores at hand and answers in the order of the items; reports between `from` and
     /// `to` as items are done.
     ///
@@ -112,6 +131,14 @@ mod tests {
         let shares = shares.into_inner().unwrap();
         assert_eq!(shares.len(), 101);
         assert!(shares.windows(2).all(|w| w[0] <= w[1]) && shares[0] > 0.2 && shares[100] == 0.6, "{shares:?}");
+    }
+
+    #[test]
+    fn two_things_at_a_time_answer_both_or_stop() {
+        let watch = Watch::new(&|_, _| true);
+        assert_eq!(watch.both(|| Ok(1), || Ok("two")), Ok((1, "two")));
+        assert_eq!(watch.both(|| Err::<(), _>(Stopped), || Ok(())), Err(Stopped));
+        assert_eq!(watch.both(|| Ok(()), || Err::<(), _>(Stopped)), Err(Stopped));
     }
 
     #[test]

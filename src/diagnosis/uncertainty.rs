@@ -8,7 +8,8 @@
 //! blocks effectively take part (Imbens and Kolesár 2016).
 
 use super::blocks;
-use super::fit::{Bench, Fit, Part, Slope, dot, pseudo_inverse};
+use super::fit::{Bench, Fit, Part, Slope, pseudo_inverse};
+use super::many::dot;
 use crate::machine::Effect;
 use nalgebra::{DMatrix, DVector};
 

@@ -118,8 +118,8 @@ pub fn diagnose(
     let bench = Bench::new(&frame, &known::trace(axis, &frame));
     let empty = bench.fit(Vec::new());
     let laws: Vec<&'static Law> = LAWS.iter().copied().filter(|law| belief::may_be_found(axis, law.cause)).collect();
-    let judge = Judge::new(axis, &whole, &bench, &watch)?;
-    let search = Search::new(&bench, &laws, &watch)?;
+    let judge = || Ok(Judge::new(axis, &whole, &bench, &watch));
+    let (judge, search) = watch.both(judge, || Search::new(&bench, &laws, &watch))?;
     let mut judged = judge.judge(search.from_belief()?)?;
     if judged.verdict == Verdict::UnknownCause {
         // Of several numbers of the belief that are wrong together none shows the way by itself.

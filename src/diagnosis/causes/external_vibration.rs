@@ -1,6 +1,7 @@
 //! A disturbance periodic in time, not in position: amplitude·sin(2π·f·t + phase); pumps, fans, neighbours.
 
 use super::*;
+use crate::diagnosis::many::sines_and_cosines;
 
 /// Parameter: periods over the recording. Coefficients: sine and cosine.
 pub static LAW: Law = Law {
@@ -13,9 +14,8 @@ pub static LAW: Law = Law {
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let per_second = shape[0] / duration(frame);
-            let rows = 0..frame.x.len();
-            let (sine, cosine): (Vec<f64>, Vec<f64>) =
-                rows.map(|i| periods::sine_cosine(per_second * frame.seconds(i))).unzip();
+            let turns: Vec<f64> = (0..frame.x.len()).map(|i| per_second * frame.seconds(i)).collect();
+            let (sine, cosine) = sines_and_cosines(&turns);
             let (sine, cosine) = (frame.judged_instants(&sine), frame.judged_instants(&cosine));
             Term { fixed: None, regressors: vec![Trace::torque(sine), Trace::torque(cosine)] }
         })

@@ -1,9 +1,9 @@
 //! Where a rest repeats: along the stroke or in time, by matched filters over all periods at once (a Fourier transform).
 
 use super::*;
+use crate::diagnosis::many::sines_and_cosines;
 use crate::machine::Drive;
 use realfft::RealFftPlanner;
-use std::f64::consts::TAU;
 
 /// Bins along the stroke: eight to the shortest period looked for.
 const STROKE_BINS: usize = 1 << 14;
@@ -27,24 +27,12 @@ pub fn waves(frame: &Frame, periods: f64) -> (Vec<f64>, Vec<f64>) {
     let k = periods / (high - low);
     // Faster than nearly half a period a row the wave would alias, at a steady speed into a constant.
     let fastest = 0.45 / (k * frame.columns.period_s);
-    let at = |(x, v): (&f64, &f64)| if v.abs() > fastest { (0.0, 0.0) } else { sine_cosine(k * (x - low)) };
-    frame.x.iter().zip(&frame.v).map(at).unzip()
-}
-
-/// Sine and cosine of so many turns, to 1e-7. The library's are exact to the last bit and take several times as long, and
-/// waves of every period at every row are what a search for ripples is made of.
-#[inline]
-pub fn sine_cosine(turns: f64) -> (f64, f64) {
-    let rest = turns - turns.round();
-    // sin over a quarter turn either side of zero by its series; beyond it the sine comes back the same way.
-    let sine = |quarter: f64| {
-        let a = TAU * quarter;
-        let s = a * a;
-        let tail = 1.0 / 362_880.0 + s * (-1.0 / 39_916_800.0 + s / 6_227_020_800.0);
-        a * (1.0 + s * (-1.0 / 6.0 + s * (1.0 / 120.0 + s * (-1.0 / 5040.0 + s * tail))))
-    };
-    let folded = if rest.abs() > 0.25 { 0.5f64.copysign(rest) - rest } else { rest };
-    (sine(folded), sine(0.25 - rest.abs()))
+    let turns: Vec<f64> = frame.x.iter().map(|x| k * (x - low)).collect();
+    let (mut sines, mut cosines) = sines_and_cosines(&turns);
+    for (i, _) in frame.v.iter().enumerate().filter(|(_, v)| v.abs() > fastest) {
+        (sines[i], cosines[i]) = (0.0, 0.0);
+    }
+    (sines, cosines)
 }
 
 /// Numbers of periods over the stroke at which the rest repeats most, and those that the drive suggests.
@@ -199,18 +187,4 @@ pub fn origin(axis: &Axis, period_mm: f64) -> String {
         }
     }
     "magnets, slots or a gear repeat with it".to_owned()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sines_of_turns_are_those_of_the_library() {
-        for i in -4000..4000 {
-            let turns = f64::from(i) * 1.7e-3;
-            let ((sine, cosine), (s, c)) = (sine_cosine(turns), (TAU * turns).sin_cos());
-            assert!((sine - s).abs() < 1e-7 && (cosine - c).abs() < 1e-7, "{turns}");
-        }
-    }
 }

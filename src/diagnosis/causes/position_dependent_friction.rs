@@ -18,7 +18,7 @@ pub static LAW: Law = Law {
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let (centre, width) = place(frame, shape);
-            Term::torque(frame.judged_by(|i| frame.direction[i] * (-((frame.x[i] - centre) / width).powi(2)).exp()))
+            Term::torque(frame.fading(|i| ((frame.x[i] - centre) / width).powi(2)))
         })
     },
     effect: |frame, shape, c| {

@@ -16,7 +16,7 @@ pub static LAW: Law = Law {
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let vs = shape[0];
-            Term::torque(frame.judged_by(|i| frame.direction[i] * (-(frame.v[i] / vs).powi(2)).exp()))
+            Term::torque(frame.fading(|i| (frame.v[i] / vs).powi(2)))
         })
     },
     effect: |frame, shape, c| {

@@ -11,6 +11,7 @@
 //! table moves with the motor, and nothing need be simulated.
 
 use super::*;
+use crate::diagnosis::many::widest;
 use crate::diagnosis::sampling::NUMEROV;
 use crate::machine::TwoMasses;
 use std::ops::Range;
@@ -43,6 +44,7 @@ const STEP_RAD: [f64; 2] = [0.12, 0.35];
 
 type Lanes = [f64; LANES];
 
+#[inline(always)]
 fn lanes(value: impl Fn(usize) -> f64) -> Lanes {
     std::array::from_fn(value)
 }
@@ -112,19 +114,23 @@ impl<'a> Tables<'a> {
     /// row to either side, and table − motor in load units.
     fn terms(&self, count: usize) -> Vec<Term> {
         let rows = self.frame.x.len();
-        let (mut extra, mut lag) = (vec![vec![0.0; rows]; count], vec![vec![0.0; rows]; count]);
-        for s in &self.frame.columns.stretches {
-            self.stretch(s.clone(), &mut extra, &mut lag);
-        }
         let with_table = self.frame.columns.table.is_some();
-        let term = |(extra, lag): (Vec<f64>, Vec<f64>)| {
-            let table = if with_table { self.frame.low_passed(&lag) } else { Vec::new() };
-            Term { fixed: Some(Trace { torque: self.frame.low_passed(&extra), table }), regressors: Vec::new() }
-        };
-        extra.into_iter().zip(lag).map(term).collect()
+        let mut extra = vec![[0.0; LANES]; rows];
+        let mut lag = vec![[0.0; LANES]; if with_table { rows } else { 0 }];
+        for s in &self.frame.columns.stretches {
+            widest(
+                #[inline(always)]
+                || self.stretch(s.clone(), &mut extra, &mut lag),
+            );
+        }
+        let torques = self.frame.low_passed_together(&extra);
+        let tables = if with_table { self.frame.low_passed_together(&lag) } else { Default::default() };
+        let term = |(torque, table)| Term { fixed: Some(Trace { torque, table }), regressors: Vec::new() };
+        torques.into_iter().zip(tables).take(count).map(term).collect()
     }
 
     /// Torque that the link of a rigid axis carries at a row.
+    #[inline(always)]
     fn carried(&self, i: usize) -> Lanes {
         let (b, unit) = (&self.frame.belief, self.frame.unit);
         let acceleration = self.frame.a[i] * unit;
@@ -132,7 +138,8 @@ impl<'a> Tables<'a> {
         lanes(|l| self.inertia[l] * acceleration + self.share[l] * friction + b.constant)
     }
 
-    fn stretch(&self, rows: Range<usize>, extra: &mut [Vec<f64>], lag: &mut [Vec<f64>]) {
+    #[inline(always)]
+    fn stretch(&self, rows: Range<usize>, extra: &mut [Lanes], lag: &mut [Lanes]) {
         let unit = self.frame.unit;
         let settled = (SWING_S / self.frame.columns.period_s).ceil() as usize;
         // Where the table of a rigid link is at a load.
@@ -164,15 +171,15 @@ impl<'a> Tables<'a> {
                 state.loose[l] = !(firm && held);
                 any |= state.loose[l];
             }
-            for (l, lag) in lag.iter_mut().enumerate() {
-                lag[i] = self.wind[l] * (state.position[l] - motor) / unit;
+            if let Some(lag) = lag.get_mut(i) {
+                *lag = lanes(|l| self.wind[l] * (state.position[l] - motor) / unit);
             }
             if any {
                 let [near, far] = self.between(i, &mut state);
                 let rigid = self.rigid(i);
-                for (l, extra) in extra.iter_mut().enumerate().filter(|(l, _)| state.loose[*l]) {
-                    extra[i] += near[l] - rigid[0][l];
-                    extra[i + 1] += far[l] - rigid[1][l];
+                for l in (0..LANES).filter(|l| state.loose[*l]) {
+                    extra[i][l] += near[l] - rigid[0][l];
+                    extra[i + 1][l] += far[l] - rigid[1][l];
                 }
             }
             load = next;
@@ -181,6 +188,7 @@ impl<'a> Tables<'a> {
 
     /// What the link of a rigid axis carries between a row and the next, shared between them as [`Tables::between`] does: the
     /// triangular mean of the acceleration is a second difference, that of friction is taken as the base takes it.
+    #[inline(always)]
     fn rigid(&self, i: usize) -> [Lanes; 2] {
         let (b, unit, span) = (&self.frame.belief, self.frame.unit, self.frame.columns.period_s);
         let step = self.frame.columns.position[i + 1] - self.frame.columns.position[i];
@@ -198,10 +206,12 @@ impl<'a> Tables<'a> {
 
     /// Moves the tables on by one row; answers the share of each link's torque that belongs to the row and to the next one, by
     /// how near it acts.
+    #[inline(always)]
     fn between(&self, i: usize, state: &mut State) -> [Lanes; 2] {
         if self.flanks { self.steps_of::<true>(i, state) } else { self.steps_of::<false>(i, state) }
     }
 
+    #[inline(always)]
     fn steps_of<const FLANKS: bool>(&self, i: usize, state: &mut State) -> [Lanes; 2] {
         let (unit, span) = (self.frame.unit, self.frame.columns.period_s);
         let at = |i: usize| (self.frame.columns.position[i] * unit, self.frame.raw_speed[i] * unit * span);
@@ -250,11 +260,13 @@ impl<'a> Tables<'a> {
 }
 
 /// The larger of two numbers; unlike the library's, which minds NaN, one instruction.
+#[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
 /// The smaller of two numbers, likewise.
+#[inline(always)]
 fn smaller(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }

@@ -13,7 +13,7 @@ pub static LAW: Law = Law {
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let tau = shape[0] * duration(frame);
-            Term::torque(frame.judged_by(|i| frame.direction[i] * (-frame.seconds(i) / tau).exp()))
+            Term::torque(frame.fading(|i| frame.seconds(i) / tau))
         })
     },
     effect: |frame, shape, c| {

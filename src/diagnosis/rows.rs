@@ -1,0 +1,87 @@
+//! Where an axis rests, which way it slides, and which rows of a recording can be judged.
+
+use super::frame::Columns;
+
+/// Most rows on which causes are compared; more are thinned evenly, which costs time and gains nothing.
+const MOST_KEPT: usize = 12_000;
+
+/// Rows at which the axis rests as far as the encoder can tell: no step for some rows, and no travel around them.
+pub fn resting_rows(columns: &Columns, resolution: f64) -> Vec<bool> {
+    let x = &columns.position;
+    let mut resting = vec![false; x.len()];
+    for s in &columns.stretches {
+        let mut run = s.start;
+        for i in s.start..s.end {
+            let (a, b) = (i.saturating_sub(1).max(s.start), (i + 1).min(s.end - 1));
+            let still = (x[b] - x[a]).abs() < 1.5 * resolution;
+            let ends = !still || i + 1 == s.end;
+            if ends {
+                let end = if still { i + 1 } else { i };
+                if end >= run + 3 {
+                    let net = (x[end - 1] - x[run]).abs();
+                    for r in run..end {
+                        let around = &x[r.saturating_sub(6).max(s.start)..(r + 7).min(s.end)];
+                        let low = around.iter().copied().fold(f64::MAX, f64::min);
+                        let high = around.iter().copied().fold(f64::MIN, f64::max);
+                        resting[r] = net < 3.0 * resolution || high - low < 3.0 * resolution;
+                    }
+                }
+                run = i + 1;
+            }
+        }
+    }
+    resting
+}
+
+/// Mean sign of the speed over each row. Through a fast reversal the crossing is found between rows from speed and
+/// acceleration; in slow motion the direction is that of the last resolved step.
+pub fn direction_of(columns: &Columns, v: &[f64], a: &[f64], resolution: f64) -> Vec<f64> {
+    let (x, h) = (&columns.position, columns.period_s);
+    let mut out = vec![0.0; x.len()];
+    for s in &columns.stretches {
+        for i in s.clone() {
+            let (before, after) = (i.saturating_sub(1).max(s.start), (i + 1).min(s.end - 1));
+            let step = x[after] - x[before];
+            let half = (0.5 * h * a[i].abs()).max(0.1 * resolution / h);
+            let smooth = (v[i] / half).clamp(-1.0, 1.0);
+            // A step that the grid cannot fake decides; the smoothed speed only places the crossing.
+            out[i] = if step.abs() > 2.5 * resolution && smooth * step < 0.0 { step.signum() } else { smooth };
+        }
+    }
+    out
+}
+
+/// How far the direction of friction is open at each row, 0 to 1: at rest, and at a turn as long as the encoder shows no way
+/// back, since the axis may stick there for a moment.
+pub fn doubtful_rows(columns: &Columns, resting: Vec<bool>, resolution: f64) -> Vec<f64> {
+    let x = &columns.position;
+    let mut doubt: Vec<f64> = resting.into_iter().map(|r| f64::from(u8::from(r))).collect();
+    for s in &columns.stretches {
+        for turn in crate::analysis::motion::turning_points(&x[s.clone()], 3.0 * resolution) {
+            let turn = s.start + turn;
+            let near = |i: usize| (x[i] - x[turn]).abs() < 2.5 * resolution;
+            let mut first = turn.saturating_sub(1).max(s.start);
+            while first > s.start && near(first - 1) {
+                first -= 1;
+            }
+            let mut last = (turn + 1).min(s.end - 1);
+            while last + 1 < s.end && near(last + 1) {
+                last += 1;
+            }
+            doubt[first..=last].fill(1.0);
+        }
+    }
+    doubt
+}
+
+/// Rows away from the ends of their stretch, thinned to the filter's own density, that carry weight.
+pub fn judged_rows(columns: &Columns, margin: usize, stride: usize, carries: impl Fn(usize) -> bool) -> Vec<usize> {
+    let mut kept = Vec::new();
+    for s in &columns.stretches {
+        if s.len() > 4 * margin {
+            kept.extend((s.start + margin..s.end - margin).step_by(stride).filter(|&row| carries(row)));
+        }
+    }
+    let thin = kept.len().div_ceil(MOST_KEPT).max(1);
+    kept.into_iter().step_by(thin).collect()
+}
