@@ -64,6 +64,28 @@ fn a_delay_is_found_at_every_phase_of_the_cycle() {
     }
 }
 
+/// Without a servo block nobody knows how the torque is sampled: so much is moved and said, and names no cause, nor spoils the
+/// numbers of those that are there. More than that is a dead time all the same.
+#[test]
+fn half_a_row_of_an_unknown_servo_is_no_dead_time() {
+    let blind = Axis { servo: None, ..rig(&[]) };
+    let moved = |d: &Diagnosis| d.notes.iter().any(|note| note.contains("late against") && note.contains("half a row"));
+    for seed in [11, 12, 13] {
+        let d = judged(&blind, &recorded(&rig(&[]), &test_moves(), seed));
+        assert!(d.verdict == Verdict::NoDiscrepancy && d.extended == blind && moved(&d), "{:?}", d.findings);
+        let d = judged(&blind, &recorded(&rig(&[Effect::InertiaMismatch { inertia: 0.0031 }]), &test_moves(), seed));
+        let Effect::InertiaMismatch { inertia } = d.findings[0].effect else { panic!("{:?}", d.findings) };
+        assert!(d.findings.len() == 1 && moved(&d) && (inertia / 0.0031 - 1.0).abs() < 2e-3, "{:?}", d.findings);
+    }
+    for delay_ms in [-2.0, 1.6] {
+        let d = judged(&blind, &recorded(&rig(&[Effect::DeadTime { delay_ms }]), &test_moves(), 11));
+        let Effect::DeadTime { delay_ms: found } = d.findings[0].effect else { panic!("{:?}", d.findings) };
+        let deviation = d.findings[0].deviations[0];
+        let off = found - delay_ms;
+        assert!(d.findings.len() == 1 && off.abs() < 2.0 * deviation && deviation < 0.31, "{found} ± {deviation}");
+    }
+}
+
 /// Found, written to a machine file, simulated from that file, and diagnosed against it: nothing is left to be said.
 #[test]
 fn what_was_found_and_simulated_again_is_no_discrepancy() {

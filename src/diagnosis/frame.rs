@@ -50,7 +50,7 @@ const CREEPING: f64 = 1e-3;
 const BLOCKS: usize = 24;
 
 /// One recording prepared for regression.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Frame<'a> {
     /// The axis as believed.
     pub axis: &'a Axis,
@@ -74,8 +74,8 @@ pub struct Frame<'a> {
     pub direction: Vec<f64>,
     /// The encoder's grid, load units.
     pub grid: f64,
-    /// By how much the torque column is late by sampling, beyond what its mean over a row takes care of, s.
-    sampled_late_s: f64,
+    /// How the torque column was sampled.
+    pub sampling: Sampling,
     /// Its timing by a delay.
     pub lateness: Lateness,
     /// By how much a delay is believed to make it later, s.
@@ -168,7 +168,7 @@ impl<'a> Frame<'a> {
             raw_speed: central,
             direction,
             grid,
-            sampled_late_s: sampling.shift_s,
+            sampling,
             lateness,
             believed_late_s: lateness.of_delay(believed_delay(axis)),
             kept,
@@ -183,6 +183,12 @@ impl<'a> Frame<'a> {
             torque_kernel,
             low_pass_kernel,
         }
+    }
+
+    /// The same recording with the torque column taken to be later by `late_s`, by whatever way its rows were sampled.
+    #[must_use]
+    pub fn aligned_by(&self, late_s: f64) -> Self {
+        Self { sampling: self.sampling.aligned(late_s), ..self.clone() }
     }
 
     /// A regressor of every row, filtered like the torque, at the judged rows.
@@ -255,7 +261,7 @@ impl<'a> Frame<'a> {
     /// A function of the measured torque, filtered and aligned as the torque is.
     #[must_use]
     pub fn aligned(&self, values: &[f64]) -> Vec<f64> {
-        let shift = (self.sampled_late_s + self.believed_late_s) / self.columns.period_s;
+        let shift = (self.sampling.shift_s + self.believed_late_s) / self.columns.period_s;
         let (rows, between) = (shift.floor(), shift - shift.floor());
         // Catmull and Rom's weights at that place between rows −1, 0, 1 and 2, with a fifth that makes the kernel odd.
         let unit =
@@ -287,7 +293,7 @@ impl<'a> Frame<'a> {
     #[must_use]
     pub fn torque(&self, late_s: f64) -> Vec<f64> {
         let late_s = self.believed_late_s + late_s;
-        let shift = (self.sampled_late_s + late_s) / self.columns.period_s;
+        let shift = (self.sampling.shift_s + late_s) / self.columns.period_s;
         let flattened = self.lateness.flattened_s2(late_s) / self.columns.period_s.powi(2);
         self.kept.iter().map(|&i| flattened_at(&self.torque, i as f64 + shift, -flattened)).collect()
     }

@@ -6,8 +6,11 @@
 //! - Rows that are servo cycles: the output u steps at a row and the motor follows with its time constant τ, so that between
 //!   two rows T(u·Ts) = T₀ + (T₁ − T₀)·(1 − e^(−r·u))/(1 − e^(−r)), r = Ts/τ. The weights are the integrals of that under the
 //!   triangle; they are not even, which is how late the column is by sampling.
-//! - Other rows: what is smooth between them has (1, 10, 1)/12, exact to the fourth order (Numerov), and is late by
+//! - Other rows: what is smooth between them has (1, 10, 1)/12, exact to the fourth order (Numerov), and is late by what
 //!   [`Lateness`] says.
+//! - Without a servo nobody knows what the drive puts into a row: the torque at its instant, as the cycle before has left it,
+//!   or that of the cycle that begins. A torque that is held over a cycle is half a row late in the one and half a row early
+//!   in the other; a motor with a lag lies between. So much is a property of the rows, and no dead time.
 
 use super::frame::Columns;
 use crate::machine::Axis;
@@ -23,6 +26,19 @@ pub struct Sampling {
     pub weights: [f64; 3],
     /// How late the column is beyond what the weights hold, s.
     pub shift_s: f64,
+    /// What is known of that.
+    pub timing: Timing,
+}
+
+/// What is known of how late a torque column is by its sampling.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Timing {
+    /// All: what is late beyond it is a dead time.
+    Known,
+    /// Nothing: it may be late or early by this much, s.
+    Within(f64),
+    /// Nothing, and what was found of it has been taken off.
+    Aligned,
 }
 
 impl Sampling {
@@ -33,10 +49,27 @@ impl Sampling {
         let whole = (columns.period_s / recorded - 1.0).abs() < 1e-9;
         match &axis.servo {
             Some(servo) if whole && (recorded / servo.period_s - 1.0).abs() < 0.01 => {
-                Self { weights: of_cycles(servo.period_s, servo.torque_time_constant_s), shift_s: 0.0 }
+                let weights = of_cycles(servo.period_s, servo.torque_time_constant_s);
+                Self { weights, shift_s: 0.0, timing: Timing::Known }
             }
-            _ => Self { weights: NUMEROV, shift_s: Lateness::of(axis, recorded).by_sampling_s },
+            Some(_) => {
+                let shift_s = Lateness::of(axis, recorded).by_sampling_s;
+                Self { weights: NUMEROV, shift_s, timing: Timing::Known }
+            }
+            None => Self { weights: NUMEROV, shift_s: 0.0, timing: Timing::Within(0.5 * recorded) },
         }
+    }
+
+    /// The same of a column that was found to be late by so much more, s, in whatever way its rows were sampled.
+    #[must_use]
+    pub fn aligned(self, late_s: f64) -> Self {
+        Self { shift_s: self.shift_s + late_s, timing: Timing::Aligned, ..self }
+    }
+
+    /// Standard deviation of a dead time by what is not known of the sampling, s: anywhere within the limits alike.
+    #[must_use]
+    pub fn deviation_s(&self) -> f64 {
+        if let Timing::Within(most_s) = self.timing { most_s / 3f64.sqrt() } else { 0.0 }
     }
 }
 

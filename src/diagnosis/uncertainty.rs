@@ -10,7 +10,7 @@
 use super::blocks;
 use super::fit::{Bench, Fit, Part, Slope, pseudo_inverse};
 use super::many::dot;
-use crate::machine::Effect;
+use crate::machine::{Cause, Effect};
 use nalgebra::{DMatrix, DVector};
 
 /// How exactly a law holds, as a share of its size: sampling, filter and the law itself are no better.
@@ -126,10 +126,24 @@ pub fn effects(bench: &Bench, fit: &Fit) -> Vec<Option<(Effect, Vec<f64>)>> {
                 let size = if own.is_empty() { values[k].abs() } else { by_coefficients.sqrt() };
                 (widened * spread.deviation(&gradient.row(k).transpose())).hypot(LAW_HOLDS * size)
             };
-            let deviations = (0..values.len()).map(deviation).collect();
+            let mut deviations: Vec<f64> = (0..values.len()).map(deviation).collect();
+            if let (Effect::DeadTime { .. }, [deviation]) = (effect, deviations.as_mut_slice()) {
+                *deviation = deviation.hypot(1e3 * bench.frame.sampling.deviation_s());
+            }
             Some((effect, deviations))
         })
         .collect()
+}
+
+/// By how much a fit has the torque column late, s, where nobody knows how its rows were sampled and that may well be all of it:
+/// the 95 % of a dead time hold zero.
+#[must_use]
+pub fn late_by_sampling(bench: &Bench, fit: &Fit) -> Option<f64> {
+    let open_s = bench.frame.sampling.deviation_s();
+    let part = fit.parts.iter().position(|part| part.law.cause == Cause::DeadTime).filter(|_| open_s > 0.0)?;
+    let (_, deviations) = effects(bench, fit).swap_remove(part)?;
+    let late_ms = *fit.parts[part].shape.first()?;
+    (late_ms.abs() < 2.0 * deviations.first()?).then_some(1e-3 * late_ms)
 }
 
 /// What is left over its noise floor, 1 or more. Where a simulation is fitted, what is left is its own error, alike in every

@@ -103,7 +103,7 @@ pub fn diagnose(
         Ok(columns) => columns,
         Err(why) => return Ok(insufficient(axis, vec![why.to_string()])),
     };
-    let mut notes = whole.note();
+    let notes = whole.note();
     if let Err(why) = axis.two_masses() {
         return Ok(insufficient(axis, vec![format!("a machine file that holds together: {why}")]));
     }
@@ -115,15 +115,38 @@ pub fn diagnose(
         return Ok(insufficient(axis, missing));
     }
     watch.at(0.05, "reading the motion")?;
-    let bench = Bench::new(&frame, &known::trace(axis, &frame));
+    let recorded = Recorded { axis, whole: &whole, holdout, watch: &watch };
+    answer(&recorded, &frame, notes)
+}
+
+/// What an answer is about beside the equations.
+struct Recorded<'d> {
+    axis: &'d Axis,
+    whole: &'d Columns,
+    holdout: Option<&'d Recording>,
+    watch: &'d Watch<'d>,
+}
+
+/// The answer on one system of equations; on aligned ones where the torque column turns out to be late by its sampling.
+fn answer(recorded: &Recorded, frame: &Frame, mut notes: Vec<String>) -> Result<Diagnosis, Stopped> {
+    let &Recorded { axis, whole, holdout, watch } = recorded;
+    let bench = Bench::new(frame, &known::trace(axis, frame));
     let empty = bench.fit(Vec::new());
     let laws: Vec<&'static Law> = LAWS.iter().copied().filter(|law| belief::may_be_found(axis, law.cause)).collect();
-    let judge = || Ok(Judge::new(axis, &whole, &bench, &watch));
-    let (judge, search) = watch.both(judge, || Search::new(&bench, &laws, &watch))?;
-    let mut judged = judge.judge(search.from_belief()?)?;
+    let judge = || Ok(Judge::new(axis, whole, &bench, watch));
+    let (judge, search) = watch.both(judge, || Search::new(&bench, &laws, watch))?;
+    let found = search.from_belief()?;
+    if let Some(late_s) = uncertainty::late_by_sampling(&bench, &found.fit) {
+        return aligned(recorded, frame, late_s, notes);
+    }
+    let mut judged = judge.judge(found)?;
     if judged.verdict == Verdict::UnknownCause {
         // Of several numbers of the belief that are wrong together none shows the way by itself.
-        let again = judge.judge(search.from_open_belief()?)?;
+        let found = search.from_open_belief()?;
+        if let Some(late_s) = uncertainty::late_by_sampling(&bench, &found.fit) {
+            return aligned(recorded, frame, late_s, notes);
+        }
+        let again = judge.judge(found)?;
         if again.verdict == Verdict::UnknownCause {
             judged.refutation = judged.refutation.or(again.refutation);
         } else {
@@ -137,13 +160,13 @@ pub fn diagnose(
         match Columns::of(holdout, axis).map(|columns| (columns.note(), columns.observed())) {
             Ok((note, Some(observed))) => {
                 notes.extend(note);
-                judged.gains = gain::on_holdout(axis, &extended, &observed, &watch)?;
+                judged.gains = gain::on_holdout(axis, &extended, &observed, watch)?;
                 if refuted(&judged.gains) {
                     let causes = findings.iter().map(|f| f.effect.cause());
                     notes.push(refutation(causes, &judged.gains, "the hold-out"));
                     judged = judge.nothing(&judged.selection);
                     (findings, extended) = (Vec::new(), axis.clone());
-                    judged.gains = gain::on_holdout(axis, axis, &observed, &watch)?;
+                    judged.gains = gain::on_holdout(axis, axis, &observed, watch)?;
                 }
             }
             why => {
@@ -164,6 +187,16 @@ pub fn diagnose(
     };
     watch.at(1.0, "done")?;
     Ok(Diagnosis { verdict, findings, gains, unexplained, shown, missing: Vec::new(), notes, extended })
+}
+
+/// The answer with the torque column moved up by what its sampling may have made it late.
+fn aligned(recorded: &Recorded, frame: &Frame, late_s: f64, mut notes: Vec<String>) -> Result<Diagnosis, Stopped> {
+    notes.push(format!(
+        "the torque column is {:.3} ms {} against the position column, and was moved: without a servo block nobody knows how its rows are sampled, and half a row may be that",
+        1e3 * late_s.abs(),
+        if late_s > 0.0 { "late" } else { "early" }
+    ));
+    answer(recorded, &frame.aligned_by(late_s), notes)
 }
 
 fn extended_by(axis: &Axis, findings: &[Finding]) -> Axis {

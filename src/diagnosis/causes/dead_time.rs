@@ -2,6 +2,7 @@
 //! constant acceleration and like inertia at reversals, so it is tried with the others from the start.
 
 use super::*;
+use crate::diagnosis::sampling::Timing;
 
 /// Parameter: by how much later the column is, in ms, which between whole cycles is not the delay ([`crate::plant::lateness`]).
 /// The trace is the measured torque less itself moved up; it has no coefficient.
@@ -9,6 +10,9 @@ pub static LAW: Law = Law {
     cause: Cause::DeadTime,
     scales: &[Scale::Linear(-20.0, 20.0, 0.05)],
     starts: |frame, _| {
+        if frame.sampling.timing == Timing::Aligned {
+            return Vec::new();
+        }
         let h = frame.columns.period_s * 1e3;
         let step = (0.5 * h).max(0.2);
         let count = (f64::max(8.0, 4.0 * h) / step).round() as i32;
