@@ -66,7 +66,7 @@ fn the_command_reads_writes_and_removes() {
         ("set 0", "0 kg·m²"),
         ("set -1", "-1"),
         ("set NaN", "NaN"),
-        ("set 0,5", "0,5"),
+        ("set 0,5", "'0,5' for '<INERTIA_KG_M2>': a number with a decimal point"),
         ("set 1 --step 10000", "10000"),
     ] {
         let (code, _, text) = ask(refused);
@@ -100,6 +100,20 @@ fn linuxcnc_takes_what_is_written() {
         text.contains("SET_AUX_OUTPUT_VALUE(0,0.500000)") && text.contains("SET_AUX_OUTPUT_VALUE(1,0.420000)"),
         "{text}"
     );
+}
+
+/// Names of up to 255 bytes, which leave the one beside no room for itself.
+#[test]
+fn a_name_may_have_any_length() {
+    for length in [249, 250, 251, 254, 255] {
+        let (folder, short) = lay_down(PROGRAM);
+        let path = folder.path().join("x".repeat(length - 3) + ".nc");
+        fs::rename(short, &path).unwrap();
+        assert!(program::set(&path, Scope::Program, 0.5, None).unwrap(), "{length}");
+        assert_eq!(program::get(&path, Scope::Program).unwrap().unwrap().inertia_kg_m2, 0.5);
+        assert!(program::remove(&path, Scope::Program).unwrap());
+        untouched(folder.path(), &path);
+    }
 }
 
 #[test]

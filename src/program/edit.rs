@@ -96,6 +96,7 @@ mod tests {
             (b"%", b"%\n(INA=0.5)"),
             (b"", b"(INA=0.5)\n"),
             (b"(c)\nG21\nO1 (A)\nT1", b"(c)\nG21\nO1 (A)\n(INA=0.5)\nT1"),
+            (b"(c)\r\n%\r\n<SHAFT-7>\r\nT1", b"(c)\r\n%\r\n<SHAFT-7>\r\n(INA=0.5)\r\nT1"),
             (b"O1 G0 X0\nX1\n", b"O1 G0 X0\n(INA=0.5)\nX1\n"),
             (b"o1 sub\no1 endsub\n", b"(INA=0.5)\no1 sub\no1 endsub\n"),
         ] {
@@ -150,7 +151,7 @@ mod tests {
     }
 
     fn title() -> impl Strategy<Value = Vec<u8>> {
-        let titles = [&b""[..], b"%\n", b"%\r\nO1\n", b"O1 (A)\r\n", b"\xef\xbb\xbf", b"%", b"O1"];
+        let titles = [&b""[..], b"%\n", b"(c)\r%\n<A-1>\r", b"%\r\nO1\n", b"O1 (A)\r\n", b"\xef\xbb\xbf", b"%", b"O1"];
         proptest::sample::select(titles.to_vec()).prop_map(<[u8]>::to_vec)
     }
 

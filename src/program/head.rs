@@ -54,7 +54,7 @@ impl Head {
     pub fn read(file: impl Read) -> Result<Head, Problem> {
         let mut lines = Lines::new(BufReader::with_capacity(LONGEST_LINE, file))?;
         let mut head = Head { found: Vec::new(), title: None, top: (lines.at, "") };
-        let (mut number, mut blank_so_far, mut numbered) = (0, true, false);
+        let (mut number, mut leader, mut numbered) = (0, true, false);
         while let Some(place) = lines.next_line()? {
             number += 1;
             if number == 1 {
@@ -64,8 +64,8 @@ impl Head {
             let (kind, statements) = line::parse(&lines.text).map_err(refused)?;
             match kind {
                 Kind::Head => {}
-                // Between the tape mark and a second one stands the program; what precedes the first is leader.
-                Kind::TapeMark { numbered: here } if blank_so_far => {
+                // Between the tape mark and a second one stands the program; blanks and comments before the first are leader.
+                Kind::TapeMark { numbered: here } if leader => {
                     head.title = Some(place);
                     numbered = here;
                 }
@@ -76,7 +76,7 @@ impl Head {
                 // A second tape mark ends the program, a second number begins another one.
                 Kind::TapeMark { .. } | Kind::Number | Kind::Body => break,
             }
-            blank_so_far &= lines.text.trim_ascii().is_empty();
+            leader &= kind == Kind::Head && statements.is_empty() && line::code(&lines.text).is_empty();
             for statement in statements {
                 head.add(number, place, &statement, &lines.text)?;
             }
@@ -203,6 +203,9 @@ mod tests {
         assert_eq!(values(b"%\nO1\nM30\nO2\n(INA=0.5)\n%"), [], "a second program's value is not this one's");
         assert_eq!(values(b"%\nO1\nO2\n(INA=0.5)\n%"), []);
         assert_eq!(values(b"%\nO1\n%\n(INA=0.5)"), [], "behind the end mark");
+        assert_eq!(values(b"(POSTED)\n\n%\nO1\n(INA=0.5)\n%"), [(Scope::Program, 0.5, 5)]);
+        assert_eq!(values(b"(INA=0.4)\n%\nO1\n(INA=0.5)\n%"), [(Scope::Program, 0.4, 1)]);
+        assert_eq!(values(b"G21\n%\nO1\n(INA=0.5)\n%"), [], "G21 is a program");
         assert_eq!(values(b"%O1(NAME)\n(INA=0.5)\nO2"), [(Scope::Program, 0.5, 2)]);
         assert_eq!(values(b"$A.MIN%\nOABC\nVARIABLE INA=0.5"), [(Scope::Program, 0.5, 3)]);
         assert_eq!(values(b"\xef\xbb\xbf(INA=0.5)"), [(Scope::Program, 0.5, 1)]);

@@ -13,7 +13,7 @@ pub(super) enum Kind {
     Head,
     /// `%`, `%O1234(NAME)` or Okuma's `$PART.MIN%`; `numbered` where a program number stands on the same line.
     TapeMark { numbered: bool },
-    /// `O1234`, `ONAME` or `:1234`.
+    /// `O1234`, `ONAME`, `:1234` or `<NAME>`.
     Number,
     /// Something that moves, turns, calls or decides: the head is over.
     Body,
@@ -106,15 +106,18 @@ fn kind(code: &[u8]) -> Kind {
         None => Kind::Head,
         Some(b'%') => Kind::TapeMark { numbered: is_number(rest.get(1..).unwrap_or_default().trim_ascii_start()) },
         Some(b'$') if rest.ends_with(b"%") => Kind::TapeMark { numbered: false },
-        Some(b'O' | b':') if is_number(rest) => Kind::Number,
+        Some(b'O' | b':' | b'<') if is_number(rest) => Kind::Number,
         Some(b'#') => Kind::Head,
         Some(_) if is_assignment(rest) || is_modal(rest) => Kind::Head,
         Some(_) => Kind::Body,
     }
 }
 
-/// `O1234`, `OSHAFT`, `:12`, also with words behind it; but not LinuxCNC's `O100 SUB`, `O<shaft> CALL`.
+/// `O1234`, `OSHAFT`, `:12`, `<SHAFT>`, also with words behind it; but not LinuxCNC's `O100 SUB`, `O<shaft> CALL`.
 fn is_number(code: &[u8]) -> bool {
+    if code.first() == Some(&b'<') {
+        return code.contains(&b'>');
+    }
     if !matches!(code.first(), Some(b'O' | b':')) {
         return false;
     }
@@ -453,6 +456,9 @@ mod tests {
             ("O1234(PART)", Kind::Number),
             (":12", Kind::Number),
             ("OSHAFT", Kind::Number),
+            ("<SHAFT-7>", Kind::Number),
+            ("%<SHAFT-7>", numbered),
+            ("<", Kind::Body),
             ("O1234 G21", Kind::Number),
             ("O1234G0X0", Kind::Number),
             ("O100 sub", Kind::Body),

@@ -75,7 +75,7 @@ impl Folder {
         let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let flags = OFlags::RDONLY | OFlags::DIRECTORY | OFlags::CLOEXEC;
         let directory = fs::open(parent, flags, Mode::empty()).map_err(failed("open the program's folder"))?;
-        let side = [OsStr::new("."), &name, OsStr::new(".gib")].into_iter().collect();
+        let side = side_of(&name);
         Ok(Folder { directory, path: parent.to_owned(), name, side })
     }
 
@@ -159,6 +159,21 @@ impl Folder {
             |s: &Stat| (s.st_dev, s.st_ino, s.st_size, s.st_mtime, s.st_mtime_nsec, s.st_ctime, s.st_ctime_nsec);
         Ok(version(&now) == version(read))
     }
+}
+
+/// `.NAME.gib`; of a name that leaves no room for that as much as fits, and a number made of the whole (FNV-1a).
+fn side_of(name: &OsStr) -> OsString {
+    const LONGEST: usize = 255 - ".".len() - ".gib".len();
+    let bytes = name.as_bytes();
+    if bytes.len() <= LONGEST {
+        return [OsStr::new("."), name, OsStr::new(".gib")].into_iter().collect();
+    }
+    let hash = bytes
+        .iter()
+        .fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
+    let number = format!("{hash:016x}");
+    let kept = bytes.get(..LONGEST - number.len()).unwrap_or_default();
+    [b".", kept, number.as_bytes(), b".gib"].map(OsStr::from_bytes).into_iter().collect()
 }
 
 /// The locked file beside the program; it goes with its owner unless it has become the program.
