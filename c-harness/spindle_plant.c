@@ -68,7 +68,13 @@ spindle_reading spindle_sense(spindle *s)
     if (s->c.saturation_nm > 0.0 && fabs(reported) > s->c.saturation_nm) {
         reported *= fabs(reported) / s->c.saturation_nm;
     }
-    r.speed_rpm = grid > 0.0 ? grid * floor(spindle_rpm(s->w) / grid + 0.5) : spindle_rpm(s->w);
+    double speed = spindle_rpm(s->w);
+    if (s->c.counts_per_turn > 0.0) {
+        double counts = floor(s->angle / TAU * s->c.counts_per_turn);
+        speed = (counts - s->counts) / s->c.counts_per_turn / s->c.cycle_s * 60.0;
+        s->counts = counts;
+    }
+    r.speed_rpm = grid > 0.0 ? grid * floor(speed / grid + 0.5) : speed;
     r.torque = reported + s->c.torque_noise_nm * normal(&s->random);
     if (uniform(&s->random) < s->c.outlier_ratio) {
         r.torque += (uniform(&s->random) - 0.5) * 8.0 * s->c.torque_limit_nm;

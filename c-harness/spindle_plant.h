@@ -25,6 +25,7 @@ typedef struct {
     double torque_noise_nm; /* standard deviation of one torque sample */
     double outlier_ratio;   /* share of torque samples that are wild */
     double speed_grid_rpm;
+    double counts_per_turn; /* the speed is the difference of an encoder's counts over a cycle; 0: it is not */
     double torque_constant_nm_a; /* the drive reports a current; 0: it reports torque */
     int torque_late_cycles;      /* the torque reported is this old, up to SPINDLE_LATEST */
     double weakening_rpm; /* above: the drive reports w/w_b times the torque delivered; 0: never */
@@ -41,6 +42,7 @@ typedef struct {
     double past[SPINDLE_LATEST + 1]; /* torque of this cycle and those before */
     double due; /* speed that was commanded for the end of the cycle before, rad/s */
     double integral;
+    double counts; /* read in the cycle before */
     double peak_w; /* power meter: largest of the motor's shaft power since it was cleared, W */
     uint64_t random;
 } spindle;

@@ -67,7 +67,7 @@ int32_t spindle_measure(const spindle_config *sc, const gib_inertia_config *c, g
     return status;
 }
 
-const char *const SIGNAL_NAMES[SIGNAL_KINDS] = {"as above", "speed in steps of 1 rpm", "current, taken by the torque constant",
+const char *const SIGNAL_NAMES[SIGNAL_KINDS] = {"as above", "speed in steps of 1 rpm", "speed from 4096 counts a turn", "current, taken by the torque constant",
                                                 "torque one cycle late", "all of these"};
 
 static int ascending(const void *a, const void *b)
@@ -86,6 +86,9 @@ int errors_of_random(uint64_t seed, signal_kind kind, double *errors, int runs)
         gib_inertia_report r;
         if (kind == SIGNAL_COARSE_SPEED || kind == SIGNAL_ALL) {
             sc.speed_grid_rpm = 1.0;
+        }
+        if (kind == SIGNAL_COUNTS || kind == SIGNAL_ALL) {
+            sc.counts_per_turn = 4096.0;
         }
         if (kind == SIGNAL_CURRENT || kind == SIGNAL_ALL) {
             c.torque_unit = GIB_TORQUE_AMPERE;

@@ -24,6 +24,7 @@ int32_t spindle_measure(const spindle_config *sc, const gib_inertia_config *c, g
 typedef enum {
     SIGNAL_USUAL,
     SIGNAL_COARSE_SPEED, /* read in steps of 1 rpm */
+    SIGNAL_COUNTS,       /* speed from the counts of an encoder, 4096 a turn: steps of 14.6 rpm */
     SIGNAL_CURRENT,      /* current, to be taken by the torque constant */
     SIGNAL_LATE_TORQUE,  /* the torque is one cycle old */
     SIGNAL_ALL,

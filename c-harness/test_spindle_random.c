@@ -31,7 +31,7 @@ static void inertia_is_within_one_percent_and_its_intervals_hold(void **state)
         held += inside;
     }
     print_message("%.1f %% of all intervals hold the truth\n", 100.0 * held / (RUNS * SIGNAL_KINDS));
-    /* Of 500 that hold 95 of 100 each, chance leads below 90 % once in a million times; of such that hold 98, beyond 99.6 %
+    /* Of 600 that hold 95 of 100 each, chance leads below 90 % once in a million times; of such that hold 98, beyond 99.6 %
        once in two thousand. */
     assert_true(held >= 0.90 * RUNS * SIGNAL_KINDS && held <= 0.996 * RUNS * SIGNAL_KINDS);
 }
@@ -131,7 +131,8 @@ static void many_short_ramps(void **state)
     assert_true(refused <= 1 && off <= 3 && held >= 65 && narrow <= 62);
 }
 
-/* A weakened field is found by itself; of saturation all that can be told from another inertia is, the rest where it is told. */
+/* A weakened field and saturation are found by themselves, since every second ramp is gentler; a saturation that is told is left
+   out. Of 520 of each none, none and one were wrong. */
 static void what_lies_beyond_base_speed_and_saturation_is_left_out(void **state)
 {
     (void)state;
@@ -139,7 +140,7 @@ static void what_lies_beyond_base_speed_and_saturation_is_left_out(void **state)
     static const struct {
         int kind, most_wrong;
         const char *name;
-    } cases[] = {{WEAKENED, 4, "weakened field"}, {SATURATED, 15, "saturation"}, {TOLD, 6, "saturation that is told"}};
+    } cases[] = {{WEAKENED, 4, "weakened field"}, {SATURATED, 2, "saturation"}, {TOLD, 3, "saturation that is told"}};
     for (int k = 0; k < 3; k++) {
         uint64_t random = seed;
         int found = 0, off = 0, refused = 0;
@@ -156,12 +157,13 @@ static void what_lies_beyond_base_speed_and_saturation_is_left_out(void **state)
                 refused++;
                 continue;
             }
+            assert_int_equal(r.one_acceleration, 0);
             found += r.weakening_rpm > 0.0 || r.saturation_nm > 0.0;
             off += wrong(&r, sc.inertia_kg_m2);
         }
         print_message("%s, seed %llu: of %d found in %d, refused %d, wrong %d\n", cases[k].name, (unsigned long long)seed, RUNS,
                       found, refused, off);
-        assert_true((cases[k].kind == TOLD || found >= RUNS / 3) && off <= cases[k].most_wrong && 2 * refused <= RUNS);
+        assert_true((cases[k].kind == TOLD || found >= RUNS / 3) && off <= cases[k].most_wrong && 4 * refused <= RUNS);
     }
 }
 

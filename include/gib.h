@@ -2459,7 +2459,7 @@ typedef struct gib_inertia_config {
      */
     int32_t torque_unit;
     /**
-     * Times up and down, 1 to 50 (default 2). There is room for some 20 short ramps up and down; of more, the first count.
+     * Times up and down, 1 to 50 (default 2; of 1 the report says `one_acceleration`). There is room for some 20 short ramps up and down; of more, the first count.
      */
     int32_t ramps;
     /**
@@ -2483,7 +2483,8 @@ typedef struct gib_inertia_config {
      */
     double speed_high_rpm;
     /**
-     * Acceleration of the ramps, rpm/s. Required for ramps.
+     * Acceleration of the ramps, rpm/s; every second one has 0.6 of it, so that a motor that saturates is not taken for another
+     * inertia. Required for ramps.
      */
     double acceleration_rpm_s;
     /**
@@ -2705,6 +2706,16 @@ typedef struct gib_inertia_report {
      * Process step that the value belongs to, as configured.
      */
     int32_t process_step;
+    /**
+     * 1 when all ramps have one acceleration: a motor that saturates, and reports more torque than it delivers, then cannot be told
+     * from another inertia. Say `saturation_nm`, or ramp at two accelerations, one at most two thirds of the other, as
+     * `GIB_INERTIA_RAMP` does from two ramps on.
+     */
+    int32_t one_acceleration;
+    /**
+     * Zero.
+     */
+    int32_t reserved;
 } gib_inertia_report;
 
 /**

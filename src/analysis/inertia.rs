@@ -63,23 +63,6 @@ pub struct Found {
     pub torque_column: String,
 }
 
-impl Found {
-    /// Whether saturation cannot be excluded: a motor that delivers less than its current says takes up T = J·a + s·sign a + …
-    /// beyond a limit, and where |a| is one number, s·sign a is (s/|a|)·a, an inertia. Ramps whose accelerations differ by half
-    /// tell them apart.
-    #[must_use]
-    pub fn one_acceleration(&self) -> bool {
-        const DIFFERENT: f64 = 1.5;
-        const CLEAR: f64 = 0.3; // of the largest: below, it is a hold or a corner
-        let mut ramps: Vec<f64> = self.blocks.iter().map(|block| block.acceleration.abs()).collect();
-        ramps.sort_by(f64::total_cmp);
-        let at = |seen: &[f64], share: f64| seen.get((share * seen.len() as f64) as usize).copied().unwrap_or(0.0);
-        let clear = CLEAR * at(&ramps, 0.98);
-        ramps.retain(|acceleration| *acceleration > clear);
-        at(&ramps, 0.9) < DIFFERENT * at(&ramps, 0.1)
-    }
-}
-
 /// Why an inertia cannot be used.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Refusal(pub Fault);
@@ -114,6 +97,11 @@ impl fmt::Display for Refusal {
             "halves_apart_ratio" => {
                 write!(f, ": the two halves of the recording differ by {:.0} % of the inertia", 100.0 * value)
             }
+            "paces_apart_ratio" => write!(
+                f,
+                ": brisk and gentle ramps differ by {:.0} % of the inertia, as where a motor saturates; use gentler ones",
+                100.0 * value
+            ),
             "own_inertia_kg_m2" => write!(f, ": {high:.6} kg·m² in all, {value:.6} kg·m² given as its own"),
             _ => Ok(()),
         }
@@ -312,7 +300,7 @@ mod tests {
         };
         let (one, two) = (saturated(1.0), saturated(0.4));
         println!("{:.3} of 0.4 at one acceleration, {:.3} at two", one.report.total_kg_m2, two.report.total_kg_m2);
-        assert!(one.one_acceleration() && !two.one_acceleration());
+        assert!(one.report.one_acceleration == 1 && two.report.one_acceleration == 0);
         assert!((one.report.total_kg_m2 / 0.4 - 1.0).abs() > 0.05, "{:?}", one.report);
         assert!(two.report.saturation_nm > 0.0 || two.refused.is_some(), "{:?}", two.report);
         assert!(two.refused.is_some() || (two.report.total_kg_m2 / 0.4 - 1.0).abs() < 0.02, "{:?}", two.report);

@@ -131,7 +131,7 @@ impl InertiaCommand {
         }
         if let Some(why) = &found.refused {
             let _ = writeln!(text, "\nNot usable: {why}.");
-        } else if self.saturation.is_none() && r.saturation_nm == 0.0 && found.one_acceleration() {
+        } else if self.saturation.is_none() && r.saturation_nm == 0.0 && r.one_acceleration == 1 {
             text += "\n  warning: one acceleration only: saturation cannot be excluded; use two accelerations, one at most two thirds of the\n";
             text += "  other, or say from which torque on the motor saturates (--saturation)\n";
         }
@@ -190,7 +190,7 @@ fn as_json(found: &Found) -> serde_json::Result<String> {
         "speeds_up_and_slows_down": r.both_ways != 0,
         "weakening_rpm": known(r.weakening_rpm),
         "saturation_nm": known(r.saturation_nm),
-        "one_acceleration": found.one_acceleration(),
+        "one_acceleration": r.one_acceleration != 0,
         "stretches": { "used": r.blocks_used, "dropped": r.blocks_dropped, "left_out": r.blocks_left_out,
                        "length_s": found.block_s, "scatter_nm": r.scatter_nm },
         "ramp_for_target": { "low_rpm": r.ramp_low_rpm, "high_rpm": r.ramp_high_rpm,

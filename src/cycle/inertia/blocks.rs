@@ -15,8 +15,8 @@
 //! 2·Σψ·x = (N+2)·S₂ − (N+1)/2·S₁ − 2·S₃,   Σu·x = (N+1)/2·S₁ − S₂
 //! ```
 //!
-//! Before, a wild sample gives way to the median of itself and its neighbours: one that is sixteen times further from it
-//! than usual (after Hampel; some 4.5 standard deviations of normal noise). Samples that say nothing about inertia
+//! Before, a wild sample gives way to the median of itself and its neighbours: one that is further from it than all but one
+//! in sixteen are, by much (after Hampel). Samples that say nothing about inertia
 //! end a block without trace: standing still, take-up, field weakening, saturation.
 
 /// Blocks that a measurement can hold.
@@ -79,23 +79,48 @@ pub struct Gather {
 }
 
 /// Both signals on their way past the wild samples.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Calm {
     before: Sample,
     middle: Sample,
-    /// Usual distance of a sample from the median of three: the median of these distances, followed by steps up and
-    /// down, which a wild one moves no further than any other.
+    /// Distance from the median of three that one sample in sixteen exceeds, followed by steps up and down, which a wild
+    /// sample moves no further than any other; and what it does not fall below.
     usual: Sample,
+    least: Sample,
+    /// Smallest step seen between two samples.
+    grid: Sample,
+}
+
+/// A sample so many times the usual distance from the median is wild: some 5 standard deviations of normal noise.
+const WILD: f64 = 3.0;
+
+impl Default for Calm {
+    fn default() -> Calm {
+        let [none, least, grid] = [0.0, 1e-6, f64::MAX].map(|value| Sample([value; 2]));
+        Calm { before: none, middle: none, usual: least, least, grid }
+    }
 }
 
 impl Calm {
+    /// Looks whether the last two samples are one step of a coarse grid apart. A signal that stands on the grid but for a step
+    /// here and there is not wild: the steps are where it goes.
+    fn watch_grid(&mut self) {
+        const ROUNDING: f64 = 1e-6;
+        for k in 0..2 {
+            let (a, b) = (self.before.0[k], self.middle.0[k]);
+            let step = (a - b).abs();
+            if step > ROUNDING * (a.abs() + b.abs()) && step < self.grid.0[k] {
+                self.grid.0[k] = step;
+                self.least.0[k] = step * 1.01 / WILD;
+            }
+        }
+    }
+
     /// The sample before `next`, or the median in its place where it is wild.
     #[inline(always)]
     fn pass(&mut self, next: Sample) -> Sample {
-        const UP: f64 = 1.0 + 1.0 / 16.0;
-        const DOWN: f64 = 1.0 / UP;
-        const LEAST: f64 = 1e-6;
-        const WILD: f64 = 16.0;
+        const DOWN: f64 = 1.0 / (1.0 + 1.0 / 64.0);
+        const UP: f64 = 1.262; // DOWN to the power of -15
         let mut passed = Sample::default();
         for k in 0..2 {
             let (a, b, c, usual) = (self.before.0[k], self.middle.0[k], next.0[k], self.usual.0[k]);
@@ -105,7 +130,7 @@ impl Calm {
             let away = (b - median).abs();
             passed.0[k] = if away > WILD * usual { median } else { b };
             let followed = usual * if away > usual { UP } else { DOWN };
-            self.usual.0[k] = if followed > LEAST { followed } else { LEAST };
+            self.usual.0[k] = if followed > self.least.0[k] { followed } else { self.least.0[k] };
         }
         self.before = self.middle;
         self.middle = next;
@@ -219,6 +244,7 @@ impl Gather {
     }
 
     fn close(&mut self) {
+        self.calm.watch_grid();
         if self.skips {
             self.leave_out(0);
             return;
@@ -264,6 +290,23 @@ mod tests {
             assert!((block.acceleration - rad_s_from_rpm(30.0)).abs() < 0.05 * rad_s_from_rpm(30.0), "{block:?}");
             assert!((block.torque - 4.0).abs() < 1e-9);
         }
+    }
+
+    /// A speed that is the difference of an encoder's counts stands on one step of its grid and goes to the next now and then: these
+    /// are where it goes, not wild.
+    #[test]
+    fn steps_of_a_coarse_grid_are_kept() {
+        const STEP: f64 = 14.6;
+        let mut gather = Gather::new(gate(), 1000, 1e-3, 1.0);
+        let counts = |t: f64| (t * (100.0 + 0.5 * 30.0 * t) / (STEP * 1e-3)).floor();
+        for i in 0..60_000 {
+            let t = f64::from(i) * 1e-3;
+            gather.add(STEP * (counts(t) - counts(t - 1e-3)), 8.0);
+        }
+        let mean = |of: fn(&Block) -> f64| gather.blocks().iter().map(of).sum::<f64>() / gather.blocks().len() as f64;
+        assert!((mean(|b| b.acceleration) / rad_s_from_rpm(30.0) - 1.0).abs() < 2e-3, "{}", mean(|b| b.acceleration));
+        let scatter = mean(|b| (b.acceleration - rad_s_from_rpm(30.0)).powi(2)).sqrt();
+        assert!(scatter < 0.01 * rad_s_from_rpm(30.0), "{scatter}");
     }
 
     /// The weighted equation holds within a block whatever the motion: T = J·ω' + B·ω with any smooth ω.

@@ -20,7 +20,7 @@ pub struct InertiaConfig {
     /// Unit of the torque input: `GIB_TORQUE_NM` (default), `GIB_TORQUE_PERMILLE` of `rated_torque_nm`, or
     /// `GIB_TORQUE_AMPERE` times `torque_constant_nm_a`.
     pub torque_unit: i32,
-    /// Times up and down, 1 to 50 (default 2). There is room for some 20 short ramps up and down; of more, the first count.
+    /// Times up and down, 1 to 50 (default 2; of 1 the report says `one_acceleration`). There is room for some 20 short ramps up and down; of more, the first count.
     pub ramps: i32,
     /// Process step that the value will belong to, 0 for the whole program, to 9999. Given back in the report.
     pub process_step: i32,
@@ -32,7 +32,8 @@ pub struct InertiaConfig {
     pub speed_low_rpm: f64,
     /// Speed at which the ramps end, rpm, up to 200000. Required for ramps. Negative: turns the other way.
     pub speed_high_rpm: f64,
-    /// Acceleration of the ramps, rpm/s. Required for ramps.
+    /// Acceleration of the ramps, rpm/s; every second one has 0.6 of it, so that a motor that saturates is not taken for another
+    /// inertia. Required for ramps.
     pub acceleration_rpm_s: f64,
     /// Time at constant speed after each ramp, up to 60 s (default 0.3).
     pub hold_s: f64,

@@ -1,8 +1,8 @@
 //! Reasons not to believe a torque, whatever the fit says: a sensor that is stuck, dead or turned round for a part of the
 //! run can look like another inertia with another friction, with a small uncertainty.
 
-use super::blocks::Block;
-use super::fit::quantile;
+use super::blocks::{BLOCKS, Block};
+use super::fit::{HOLD, quantile};
 use super::robust::{Regression, Rows};
 use crate::error::{Fault, GIB_ERR_INERTIA_TORQUE};
 
@@ -12,6 +12,7 @@ pub fn doubt(blocks: &[Block], rows: &Rows, found: &Regression, both_ways: bool)
         .or_else(|| if both_ways { dead(rows, found) } else { None })
         .or_else(|| torn(found))
         .or_else(|| halves(rows, found))
+        .or_else(|| paces(rows, found))
 }
 
 fn fault(field: &'static str, value: f64, high: f64) -> Fault {
@@ -53,20 +54,39 @@ fn torn(found: &Regression) -> Option<Fault> {
 
 /// The first and the second half of the motion each say clearly what the other denies.
 fn halves(rows: &Rows, found: &Regression) -> Option<Fault> {
+    apart("halves_apart_ratio\0", rows.blocks.split_at(rows.blocks.len() / 2), rows, found)
+}
+
+/// Brisk ramps and gentle ones, each with the holds, say clearly what the other denies: the motor saturates at both.
+fn paces(rows: &Rows, found: &Regression) -> Option<Fault> {
+    const BRISK: f64 = 0.8; // of the largest acceleration seen
+    let most = quantile(rows.blocks, 0.98, |b| b.acceleration.abs());
+    let (mut brisk, mut gentle) = ([Block::default(); BLOCKS], [Block::default(); BLOCKS]);
+    let of = |place: &mut [Block; BLOCKS], wanted: fn(f64) -> bool| {
+        let chosen = rows.blocks.iter().filter(|b| wanted(b.acceleration.abs() / most));
+        place.iter_mut().zip(chosen).map(|(place, block)| *place = *block).count()
+    };
+    let n = of(&mut brisk, |share| !(HOLD..BRISK).contains(&share));
+    let m = of(&mut gentle, |share| share < BRISK);
+    apart("paces_apart_ratio\0", (brisk.get(..n)?, gentle.get(..m)?), rows, found)
+}
+
+/// Two parts of the motion that say clearly what the other denies.
+fn apart(field: &'static str, parts: (&[Block], &[Block]), rows: &Rows, found: &Regression) -> Option<Fault> {
     const CLEAR: f64 = 4.0; // standard deviations
     const MOST: f64 = 0.1; // of the inertia: below, it is the ripple
-    let (first, second) = rows.blocks.split_at(rows.blocks.len() / 2);
-    let half = |blocks| Rows { blocks, ..*rows }.fit();
-    let (first, second) = (half(first)?, half(second)?);
+    let part = |blocks| Rows { blocks, ..*rows }.fit();
+    let (first, second) = (part(parts.0)?, part(parts.1)?);
     let apart = (first.terms[0] - second.terms[0]).abs();
     let chance = (first.variance[0] + second.variance[0]).max(0.0).sqrt();
     let share = apart / found.terms[0].abs().max(f64::MIN_POSITIVE);
-    (share > MOST && apart > CLEAR * chance).then(|| fault("halves_apart_ratio\0", share, MOST))
+    (share > MOST && apart > CLEAR * chance).then(|| fault(field, share, MOST))
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::fit::{Question, fit};
+    use super::super::robust::{Limit, Terms};
     use super::*;
     use crate::error::GIB_ERR_INERTIA_TORQUE;
 
@@ -96,6 +116,26 @@ mod tests {
         assert_eq!(code(|i, _| 0.05 * (i as f64 * 2.7).sin()), GIB_ERR_INERTIA_TORQUE, "dead");
         assert_eq!(code(|i, truth| if i < 60 { truth } else { -truth }), GIB_ERR_INERTIA_TORQUE, "turned round");
         assert_eq!(code(|i, truth| if i < 80 { truth } else { 2.0 * truth }), GIB_ERR_INERTIA_TORQUE, "changed");
+    }
+
+    /// A motor that delivers less than it says beyond 15 N·m, at brisk ramps and at gentle ones: each alone is another inertia.
+    #[test]
+    fn paces_that_deny_each_other_are_named() {
+        let saturates = |block: usize, gentle: f64| {
+            let pace = if (block / 40).is_multiple_of(2) { 1.0 } else { gentle };
+            let acceleration = pace * [60.0, 0.0, -60.0, 0.0][block / 10 % 4];
+            let delivered = 0.8 * acceleration + 2.0 + 0.3 * (block as f64 * 2.7).sin();
+            let torque = delivered + 0.6 * (delivered.abs() - 15.0).max(0.0).copysign(delivered);
+            Block { torque, speed: 60.0 + (block % 10) as f64, acceleration }
+        };
+        let doubted = |gentle: f64| {
+            let blocks: Vec<Block> = (0..160).map(|i| saturates(i, gentle)).collect();
+            let trusted = Limit::none(Terms::zeros());
+            let rows = Rows { blocks: &blocks, both_senses: false, noise: 0.0, trusted, suspected: None };
+            paces(&rows, &rows.fit().unwrap()).map(|fault| (fault.code, fault.field))
+        };
+        assert_eq!(doubted(0.4), Some((GIB_ERR_INERTIA_TORQUE, "paces_apart_ratio\0")));
+        assert_eq!(doubted(1.0), None, "one acceleration tells nothing");
     }
 
     /// Wild blocks that come one by one are no reason for doubt.

@@ -71,6 +71,8 @@ pub struct Balance {
     pub saturation: f64,
     /// True where there is acceleration as well as braking.
     pub both_ways: bool,
+    /// True where all ramps have one acceleration, so that saturation cannot be told from inertia.
+    pub one_acceleration: bool,
     /// The ramp that would reach the uncertainty wanted.
     pub ramp: Ramp,
 }
@@ -92,6 +94,8 @@ const NEAR: f64 = 1.0;
 const STEPS: usize = 32;
 /// The lowest of them, as a share of the largest value seen.
 const LOWEST: f64 = 0.35;
+/// An acceleration below this share of the largest is a hold or a corner, not a ramp.
+pub(super) const HOLD: f64 = 0.3;
 /// Share of a block's variance that the parabola's weights add to that of a plain mean (6/5).
 const PARABOLA: f64 = 1.2;
 
@@ -102,6 +106,7 @@ const PARABOLA: f64 = 1.2;
 /// `GIB_ERR_INERTIA_TORQUE`.
 pub fn fit(blocks: &[Block], length: u32, question: &Question) -> (Balance, Result<(), Fault>) {
     let mut balance = Balance { both_ways: both_ways(blocks), naive: naive(blocks), ..Balance::default() };
+    balance.one_acceleration = one_acceleration(blocks);
     if blocks.len() < FEWEST {
         let (value, low) = (blocks.len() as f64, FEWEST as f64);
         let fault = Fault { code: GIB_ERR_INERTIA_FEW, field: "blocks\0", value, low, high: BLOCKS as f64 };
@@ -109,7 +114,7 @@ pub fn fit(blocks: &[Block], length: u32, question: &Question) -> (Balance, Resu
     }
     let mut kept = [Block::default(); BLOCKS];
     let count = without_lone(blocks, &mut kept);
-    let whole = rows(kept.get(..count).unwrap_or(&[]));
+    let whole = rows(kept.get(..count).unwrap_or(&[])).with_noise_that_torque_denies();
     let (rows, weakening, saturation) = trustworthy(whole);
     balance.weakening = weakening;
     balance.saturation = saturation;
@@ -276,14 +281,30 @@ pub(super) fn quantile(blocks: &[Block], share: f64, of: impl Fn(&Block) -> f64)
 
 /// Whether at least a tenth of the blocks speeds up and another tenth slows down, by more than noise.
 fn both_ways(blocks: &[Block]) -> bool {
-    let clear = 0.3 * quantile(blocks, 0.98, |b| b.acceleration.abs());
+    let clear = HOLD * quantile(blocks, 0.98, |b| b.acceleration.abs());
     let share = |sign: f64| blocks.iter().filter(|b| sign * b.acceleration * b.speed.signum() > clear).count();
     10 * share(1.0) >= blocks.len() && 10 * share(-1.0) >= blocks.len()
 }
 
+/// Whether saturation cannot be excluded: a motor that delivers less than its current says takes up T = J·a + s·sign a + …
+/// beyond a limit, and where |a| is one number, s·sign a is (s/|a|)·a, an inertia. Ramps whose accelerations differ by half
+/// tell them apart.
+fn one_acceleration(blocks: &[Block]) -> bool {
+    const DIFFERENT: f64 = 1.5;
+    let clear = HOLD * quantile(blocks, 0.98, |b| b.acceleration.abs());
+    let mut ramps = [Block::default(); BLOCKS];
+    let mut n = 0;
+    for (block, place) in blocks.iter().filter(|b| b.acceleration.abs() > clear).zip(ramps.iter_mut()) {
+        *place = *block;
+        n += 1;
+    }
+    let at = |share| quantile(ramps.get(..n).unwrap_or(&[]), share, |b| b.acceleration.abs());
+    at(0.9) < DIFFERENT * at(0.1)
+}
+
 /// T/ω' where the spindle clearly speeds up.
 fn naive(blocks: &[Block]) -> f64 {
-    let clear = 0.3 * quantile(blocks, 0.98, |b| b.acceleration.abs());
+    let clear = HOLD * quantile(blocks, 0.98, |b| b.acceleration.abs());
     let (torque, acceleration) = blocks
         .iter()
         .filter(|b| b.acceleration * b.speed.signum() > clear)

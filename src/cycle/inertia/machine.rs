@@ -191,7 +191,10 @@ impl Inertia {
                 }
                 return;
             }
-            Phase::Return => return self.go_on_returning(input),
+            Phase::Return => {
+                self.go_on_returning(input);
+                return self.grant();
+            }
             Phase::Begin if speed.is_finite() => self.output.speed_command_rpm = speed,
             _ => {}
         }
@@ -219,8 +222,7 @@ impl Inertia {
     /// Grants the quiet cycles until state or block ends.
     #[inline(always)]
     fn grant(&mut self) {
-        let gathers = self.busy() && self.phase != Phase::Return;
-        let quiet = if gathers { self.left.min(self.gather.quiet()) } else { 0 };
+        let quiet = if self.busy() { self.left.min(self.gather.quiet()) } else { 0 };
         self.granted = i32::try_from(quiet).unwrap_or(i32::MAX);
         self.quiet = self.granted;
     }
@@ -318,9 +320,9 @@ impl Inertia {
             Phase::Idle | Phase::Begin | Phase::Done | Phase::Failed => (command, 0),
             Phase::Approach => (low, plan.cycles_between(low, command)),
             Phase::HoldLow(_) => (low, plan.hold),
-            Phase::Up(_) => (high, plan.cycles_between(high, command)),
+            Phase::Up(ramp) => (high, plan.cycles_of(ramp)),
             Phase::HoldHigh(_) => (high, plan.hold),
-            Phase::Down(_) => (low, plan.cycles_between(low, command)),
+            Phase::Down(ramp) => (low, plan.cycles_of(ramp)),
             Phase::Listening => (command, plan.listen_cycles),
             Phase::Return => (self.start_speed, plan.cycles_between(self.start_speed, command)),
         };

@@ -17,8 +17,10 @@ pub struct Plan {
     pub speeds: [f64; 2],
     /// Largest change of speed, rpm per cycle.
     pub acceleration: f64,
-    /// Cycles of a ramp.
+    /// Cycles of the first ramp, the third and so on, and of those between them, which are gentler.
     pub ramp: u32,
+    /// See `ramp`.
+    pub gentle: u32,
     /// Cycles at constant speed.
     pub hold: u32,
     /// Cycles to listen.
@@ -44,6 +46,9 @@ const BLOCKS_PER_RAMP: u32 = 24;
 /// Fewest where it does not: with fewer, the corners of the ramps cannot be told from noise. Of more ramps than have room then
 /// the first count.
 const FEWEST_PER_RAMP: u32 = 8;
+/// Acceleration of every second ramp, as a share of the first's: a motor that saturates looks like another inertia at one
+/// acceleration, and at two it does not.
+const GENTLER: f64 = 0.6;
 /// Blocks that a whole measurement is planned to fill; the rest is room for what starts late.
 const PLANNED: u32 = BLOCKS as u32 * 4 / 5;
 
@@ -57,6 +62,7 @@ impl Plan {
             speeds: [0.0, 0.0],
             acceleration: 1.0,
             ramp: 1,
+            gentle: 1,
             hold: 1,
             listen_cycles: 1,
             gate: Gate { standstill: 1.0, base: f64::MAX, saturation: f64::MAX, takeup: 1 },
@@ -132,6 +138,7 @@ impl Plan {
         self.speeds = if high < 0.0 { [-low, -top] } else { [low, top] };
         self.acceleration = acceleration * cycle;
         self.ramp = self.cycles_between(low, top);
+        self.gentle = (f64::from(self.ramp) / GENTLER) as u32;
         self.hold = (hold / cycle + 0.5) as u32;
         let roomy = (self.gathering() / PLANNED).min(self.ramp / FEWEST_PER_RAMP);
         self.block = (self.ramp / BLOCKS_PER_RAMP).max(roomy).max(4);
@@ -146,10 +153,18 @@ impl Plan {
         (((to - from).abs() / self.acceleration - TRIFLE).ceil() as u32).max(1)
     }
 
+    /// Cycles that the ramp of this number (from 0) takes up, and down again.
+    #[must_use]
+    pub fn cycles_of(&self, ramp: u32) -> u32 {
+        if ramp.is_multiple_of(2) { self.ramp } else { self.gentle }
+    }
+
     /// Cycles in which ramps and holds are gathered.
     #[must_use]
     pub fn gathering(&self) -> u32 {
-        self.ramps.saturating_mul(2).saturating_mul(self.ramp.saturating_add(self.hold)).saturating_add(self.hold)
+        let one = |ramp| 2 * u64::from(self.cycles_of(ramp)) + 2 * u64::from(self.hold);
+        let all = u64::from(self.hold) + (0..self.ramps).map(one).sum::<u64>();
+        u32::try_from(all).unwrap_or(u32::MAX)
     }
 }
 

@@ -59,6 +59,12 @@ pub struct InertiaReport {
     pub blocks_left_out: i32,
     /// Process step that the value belongs to, as configured.
     pub process_step: i32,
+    /// 1 when all ramps have one acceleration: a motor that saturates, and reports more torque than it delivers, then cannot be told
+    /// from another inertia. Say `saturation_nm`, or ramp at two accelerations, one at most two thirds of the other, as
+    /// `GIB_INERTIA_RAMP` does from two ramps on.
+    pub one_acceleration: i32,
+    /// Zero.
+    pub reserved: i32,
 }
 
 impl InertiaReport {
@@ -105,6 +111,8 @@ impl InertiaReport {
             blocks_dropped: balance.dropped as i32,
             blocks_left_out: balance.left_out as i32,
             process_step,
+            one_acceleration: i32::from(balance.one_acceleration),
+            reserved: 0,
         }
     }
 }

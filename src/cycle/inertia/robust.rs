@@ -118,6 +118,14 @@ impl Rows<'_> {
         self.trusted.beyond(&self.motion(block)).0 <= 0.0
     }
 
+    /// Noise of the acceleration is no motion, so torque contradicts it by J times as much: what torque follows is motion, as of a
+    /// drive that chases the steps of a coarse speed, and must not be taken off.
+    #[must_use]
+    pub fn with_noise_that_torque_denies(self) -> Self {
+        let most = self.fit().map_or(f64::MAX, |found| (found.scatter / found.terms[0]).powi(2));
+        Rows { noise: self.noise.min(most), ..self }
+    }
+
     fn unknowns(&self) -> usize {
         CONSTANT + usize::from(self.both_senses) + usize::from(self.suspected.is_some())
     }
@@ -293,6 +301,21 @@ mod tests {
         };
         let blocks: Vec<Block> = (0..60).map(block).collect();
         assert!(rows(&blocks).fit().is_none());
+    }
+
+    /// Motion that goes to and fro from block to block looks like noise, but torque goes with it.
+    #[test]
+    fn motion_that_torque_follows_is_no_noise() {
+        let mut blocks: Vec<Block> = exact(0.3, 0.02, 4.0);
+        for (i, block) in blocks.iter_mut().enumerate() {
+            let motion = if i % 2 == 0 { 6.0 } else { -6.0 };
+            block.acceleration += motion;
+            block.torque += 0.3 * motion + 0.05 * (i as f64 * 2.7).sin();
+        }
+        let taken = Rows { noise: 2.7 * 36.0, ..rows(&blocks) }; // what a second difference makes of it
+        assert!(taken.fit().unwrap().terms[0] > 0.3 * 1.02);
+        let fit = taken.with_noise_that_torque_denies().fit().unwrap();
+        assert!((fit.terms[0] - 0.3).abs() < 0.3 * 0.002, "{:?}", fit.terms);
     }
 
     #[test]

@@ -141,7 +141,7 @@ fn measure(
 #[test]
 fn error_and_coverage_on_random_spindles() {
     const SEED: u64 = 20_240_611;
-    const SPINDLES: usize = 200;
+    const SPINDLES: usize = 400;
     println!("seed {SEED}");
     let mut random = Random(SEED);
     let (mut covered, mut worst) = ([0usize; 3], 0.0f64);
