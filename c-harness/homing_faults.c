@@ -158,8 +158,7 @@ homing_branch homing_world_break(homing_world *w, homing_fault fault)
     if (b.status == GIB_DONE) {
         /* Homed in spite of a fault is right only where home is right. */
         const homing_plant_config *c = &w->plant.c;
-        double slides = (1.0 - c->motor_share) * c->friction_nm + c->constant_nm;
-        double lead = copysign(0.5 * c->clearance_mm, slides) + slides / c->stiffness_nm_mm;
+        double lead = homing_plant_lead(c, 1.0);
         double home = w->config.set_position_mm + c->sense * w->config.zero_offset_mm;
         double error = c->sense * (c->stop_mm[0] + lead) + w->plant.shift_mm[0] - home;
         int moved = fault == FAULT_STOP_GONE || fault == FAULT_STOP_EARLY; /* the stop, after it was measured */

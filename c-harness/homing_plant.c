@@ -130,6 +130,19 @@ static double pushes(double depth, double speed, double stiffness, double dampin
     return depth > 0.0 ? fmax(stiffness * depth + damping * speed, 0.0) : 0.0;
 }
 
+/* Friction of the table of which `coulomb` is left at speed. */
+static double table_friction(const homing_plant_config *c, double coulomb, double speed)
+{
+    double slow = c->stribeck_mm_s > 0.0 ? speed / c->stribeck_mm_s : INFINITY;
+    return coulomb * (1.0 + (c->breakaway_ratio - 1.0) * exp(-slow * slow));
+}
+
+double homing_plant_lead(const homing_plant_config *c, double speed)
+{
+    double slides = table_friction(c, (1.0 - c->motor_share) * c->friction_nm, speed) + c->constant_nm;
+    return copysign(0.5 * c->clearance_mm, slides) + slides / c->stiffness_nm_mm;
+}
+
 static void substep(homing_plant *p, homing_plant_side *s, int i, double torque_command, double dt)
 {
     const homing_plant_config *c = &p->c;
@@ -156,8 +169,8 @@ static void substep(homing_plant *p, homing_plant_side *s, int i, double torque_
     double motor_friction = c->motor_share * c->friction_nm;
     move(&s->x, &s->vx, &s->motor_sticks, s->torque - drive, motor_friction, motor_friction,
          c->motor_inertia_nm_s2_mm, dt);
-    move(&s->y, &s->vy, &s->table_sticks, drive - against, friction, c->breakaway_ratio * friction,
-         c->table_inertia_nm_s2_mm, dt);
+    move(&s->y, &s->vy, &s->table_sticks, drive - against, table_friction(c, friction, s->vy),
+         c->breakaway_ratio * friction, c->table_inertia_nm_s2_mm, dt);
 }
 
 /* The servo of one side; `target` in mm toward the stop. */

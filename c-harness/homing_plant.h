@@ -4,7 +4,7 @@
  * header. Positions in mm of load travel, torques in N·m at the motor; positive is toward the stop.
  *
  *   motor    Jm·x'' = T − Tm·sign(x') − Tdrive
- *   table    Jt·y'' = Tdrive − Ts·sign(y') − B·y' − T0 − Tstop − Tchips − Tbeam
+ *   table    Jt·y'' = Tdrive − Ts·sign(y') − B·y' − T0 − Tstop − Tchips − Tbeam      Ts = F·(1 + (b − 1)·exp(−(y'/vs)²))
  *   stop     Tstop = ks·(y − ystop) + ds·y' where that pushes back, else 0
  *   servo    P position, PI velocity, feed-forward, torque limit, first-order current loop, on the quantised encoder
  */
@@ -22,6 +22,7 @@ typedef struct {
     double motor_inertia_nm_s2_mm, table_inertia_nm_s2_mm;
     double stiffness_nm_mm, damping_nm_s_mm, clearance_mm; /* drive */
     double friction_nm, motor_share, breakaway_ratio, viscous_nm_s_mm, constant_nm;
+    double stribeck_mm_s; /* below about this speed the table's friction rises to break-away; 0: only at rest */
     double stop_mm[2], stop_stiffness_nm_mm, stop_damping_nm_s_mm;
     double beam_nm_mm;                                             /* crossbeam of a gantry */
     double chips_mm, chips_stiffness_nm_mm, chips_crush_mm;        /* layer before the stop; what a press crushes */
@@ -92,6 +93,8 @@ typedef struct {
 
 homing_plant_config homing_plant_default(void);
 void homing_plant_init(homing_plant *p, const homing_plant_config *c);
+/* By how much the motor leads its table, which slides at `speed` mm/s toward the stop: half the clearance and the wind-up. */
+double homing_plant_lead(const homing_plant_config *c, double speed);
 /* From now on `fault` is there. */
 void homing_plant_break(homing_plant *p, homing_fault fault);
 /* The axis moves for one cycle as gib asked for in `out`, and the kernel carries out requests; fills `in`. */

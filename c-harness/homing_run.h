@@ -79,10 +79,9 @@ static inline homing_outcome homing_run(const homing_plant_config *c, const gib_
         }
     }
     o.limit_nm = p.limit_nm;
-    /* The motor leads the table by half the clearance and the wind-up of what the table takes to slide. */
-    double slides = (1.0 - c->motor_share) * c->friction_nm + c->constant_nm;
-    double lead = copysign(0.5 * c->clearance_mm, slides) + slides / c->stiffness_nm_mm;
-    double contact = c->sense * (c->stop_mm[0] + lead);
+    double approach = g->approach_speed_mm_s > 0.0 ? g->approach_speed_mm_s : 1.0;
+    double touch = g->touch_speed_mm_s > 0.0 ? g->touch_speed_mm_s : fmin(approach, 1.0);
+    double contact = c->sense * (c->stop_mm[0] + homing_plant_lead(c, touch));
     double wanted = g->set_position_mm + c->sense * g->zero_offset_mm;
     o.home_error_um = 1e3 * c->sense * (contact + p.shift_mm[0] - wanted);
     gib_homing_free(gib);

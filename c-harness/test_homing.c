@@ -105,6 +105,28 @@ static void torque_unit_and_polarity(void **state)
     }
 }
 
+/*
+ * A servo without integral drops its torque with its deviation, and the stop pushes the motor back faster than any encoder
+ * may run otherwise: no fault.
+ */
+static void springs_back_when_the_deviation_is_dropped(void **state)
+{
+    (void)state;
+    for (int instant = 0; instant <= 1; instant++) {
+        homing_plant_config c = homing_plant_default();
+        c.cycle_s = 0.002;
+        c.velocity_gain_nm_s_mm = 0.23;
+        c.velocity_integral_time_s = 0.0;
+        gib_homing_config g = homing_config(&c);
+        g.torque_limit_nm = 10.0;
+        g.press_max_mm = 0.4;
+        g.lag_reduction = instant;
+        homing_outcome o = homing_run(&c, &g);
+        assert_int_equal(o.status, GIB_DONE);
+        assert_true(fabs(o.home_error_um) < 2.0);
+    }
+}
+
 /* Which home is: where the line starts unless the plain threshold is asked for; both are reported. */
 static void method(void **state)
 {
@@ -192,6 +214,7 @@ int main(void)
         cmocka_unit_test(home_depends_on_neither_limit_nor_stiffness),
         cmocka_unit_test(degrees_and_instant_lag_reduction),
         cmocka_unit_test(torque_unit_and_polarity),
+        cmocka_unit_test(springs_back_when_the_deviation_is_dropped),
         cmocka_unit_test(method),
         cmocka_unit_test(gantry),
         cmocka_unit_test(refuses_what_it_cannot_do),

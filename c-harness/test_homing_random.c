@@ -1,5 +1,5 @@
 /*
- * Homing on random axes: cycle, stiffness of drive and stop, friction, break-away, gravity, clearance, inertia, servo gains,
+ * Homing on random axes: cycle, stiffness of drive and stop, friction, break-away, Stribeck, gravity, clearance, inertia, servo gains,
  * encoder, noise, limit and speed. Each either homes, within what it says of itself, or ends in a named fault; all are safe.
  * Another seed than the fresh one that is printed: test_homing_random SEED [RUNS].
  */
@@ -41,6 +41,7 @@ static homing_plant_config random_axis(uint64_t *random)
     c.friction_nm = between(random, 0.1, 2.0);
     c.motor_share = between(random, 0.0, 0.4);
     c.breakaway_ratio = between(random, 1.0, 1.5);
+    c.stribeck_mm_s = between(random, 0.0, 1.0) < 0.5 ? 0.0 : over(random, 0.3, 5.0);
     /* Less than friction holds: see the limits in docs/homing.md. */
     c.constant_nm = fmax(between(random, -0.8, 0.8), -0.9 * (1.0 - c.motor_share) * c.friction_nm);
     c.clearance_mm = between(random, 0.0, 0.03);
@@ -90,9 +91,9 @@ static void homed_within_what_it_says_or_refused_by_name(void **state)
     print_message("seed %llu: %d of %d random axes homed, %.1f %% of the intervals hold the truth, worst error %.2f um, "
                   "worst %.1f times its uncertainty; %d refused by name\n",
                   (unsigned long long)seed, homed, runs, 100.0 * held / homed, worst, worst_share, refused);
-    assert_true(refused <= 0.08 * runs);
+    assert_true(refused <= 0.16 * runs);
     /* 95 of 100 are meant; of 150, less than 87 % happens by chance once in ten thousand. */
-    assert_true(held >= 0.87 * homed && worst_share <= 4.0);
+    assert_true(held >= 0.87 * homed && worst_share <= 3.5);
 }
 
 int main(int argc, char **argv)

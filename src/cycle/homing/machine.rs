@@ -342,7 +342,11 @@ impl Homing {
             let finite = position.is_finite() && torque.is_finite();
             // Before the first cycle there is no command to lag behind; at the end the kernel may have shifted already.
             let shifted = self.phase == Phase::Set && side.safe(&self.plan, position - self.output.shift_mm[i], torque);
-            let placed = finite && (self.phase == Phase::Begin || shifted);
+            // The deviation of a pressed motor is dropped, and its torque with it.
+            let sprung = matches!(self.phase, Phase::Clear | Phase::Evaluate)
+                && self.touch >= self.plan.touches
+                && side.springs_back(&self.plan, position, torque, self.touches[i & 1].press(&self.plan));
+            let placed = finite && (self.phase == Phase::Begin || shifted || sprung);
             if !placed && !side.safe(&self.plan, position, torque) {
                 return Some(side.name_danger(&self.plan, position, torque));
             }

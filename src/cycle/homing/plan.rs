@@ -79,6 +79,8 @@ pub struct Plan {
 
 /// Blocks of a touch in which a torque reading that never changes is stuck.
 pub const STUCK_BLOCKS: u32 = 100;
+/// Time that the line of a touch shall take, s: while the impact still swings, nothing can be read off it.
+pub const LINE_S: f64 = 0.025;
 /// Blocks that a touch's level and line shall take up in its trace.
 const TRACE_BLOCKS: f64 = 1200.0;
 
@@ -202,10 +204,8 @@ impl Plan {
         (self.window() / (TRACE_BLOCKS * speed)).ceil() as u32
     }
 
-    /// Makes the measured touches slow enough for a line of `press` mm, down to a quarter of their speed: while the impact
-    /// still swings, nothing can be read off the line.
+    /// Makes the measured touches slow enough for a line of `press` mm, down to a quarter of their speed.
     pub fn slow_down(&mut self, press: f64) {
-        const LINE_S: f64 = 0.025;
         if self.may_slow && press > 0.0 {
             let slow = press / (LINE_S * self.cycles_per_s);
             self.touch = slow.max(0.25 * self.touch).min(self.touch);

@@ -130,8 +130,20 @@ impl Side {
     /// Whether this cycle's readings are within all bounds.
     #[inline(always)]
     pub fn safe(&self, plan: &Plan, position: f64, torque: f64) -> bool {
+        (position - self.position).abs() <= plan.jump && self.bounded(plan, position, torque)
+    }
+
+    /// The same, but for a jump that a motor makes whose torque is taken off while it is pressed: drive and stop, which give
+    /// way by `press` until the torque is limiting, push it back from its anchor by no more than three times that.
+    #[must_use]
+    pub fn springs_back(&self, plan: &Plan, position: f64, torque: f64, press: f64) -> bool {
+        let back = plan.sense * (self.anchor - position);
+        (-plan.jump..=3.0 * press + plan.jump).contains(&back) && self.bounded(plan, position, torque)
+    }
+
+    #[inline(always)]
+    fn bounded(&self, plan: &Plan, position: f64, torque: f64) -> bool {
         (self.profile.position - position).abs() <= plan.lag_limit
-            && (position - self.position).abs() <= plan.jump
             && plan.sense * (position - self.start) <= plan.distance[1]
             && torque.is_finite()
             && self.filtered.abs() <= plan.bound

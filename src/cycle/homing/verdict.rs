@@ -1,10 +1,11 @@
 //! From single touches to a home position: do they agree, how sure is it, and what is reported.
 //!
 //! The variance of the mean is what the fits expect and what the touches show, added, since few touches show little; and
-//! what all touches have in common: the axis does not take the stop's force the very moment it meets it, and may have swung.
+//! what all touches have in common: the axis does not take the stop's force the very moment it meets it, may have swung, and
+//! slides under another friction than it stands under.
 
 use super::fit::{Contact, Fit};
-use super::plan::Plan;
+use super::plan::{LINE_S, Plan};
 use crate::error::*;
 
 /// What a homing found on one motor. Lengths in mm and µm, torque in N·m.
@@ -150,12 +151,21 @@ impl Touches {
         /// Time in s, as a standard deviation, by which torque and position of an impact differ: current loop, instant of
         /// sampling, swinging. On random axes, most of 0.3 to 4 times the usual inertia, the intervals then hold 94 of 100.
         const IMPACT_S: f64 = 0.4e-3;
+        /// The same for friction, as a share of the torque before contact: on the stop the table comes to rest, where friction
+        /// is not what it was under way (Stribeck). On random axes whose friction rises by up to 1.8 times toward rest, 0.03
+        /// to 0.05 is most likely.
+        const FRICTION: f64 = 0.04;
         let n = self.n.max(1.0);
         let expected = self.variances / n;
         let shown = (self.squares - self.sum * self.sum / n).max(0.0) / (n - 1.0).max(1.0);
         let impact = IMPACT_S * plan.touch * plan.cycles_per_s;
         let swing = self.swing();
-        ((expected + shown) / n + impact * impact + swing * swing).sqrt()
+        let friction = FRICTION * self.mean.level / self.mean.stiffness.max(f64::MIN_POSITIVE);
+        // A line that takes less time than the impact swings is impact for the rest of it.
+        let press = self.mean.press / n;
+        let short = (press - press * press / (LINE_S * plan.cycles_per_s * plan.touch)).max(0.0);
+        let shared = [impact, swing, friction, short].iter().fold(0.0, |sum, part| sum + part * part);
+        ((expected + shown) / n + shared).sqrt()
     }
 
     /// Whether the touches agree: a chip, a tight spot or a slipping encoder does not repeat.
@@ -194,6 +204,16 @@ impl Touches {
     #[must_use]
     pub fn first_press(&self) -> f64 {
         self.first_press
+    }
+
+    /// The same of all touches so far; the largest allowed where none gave a contact point.
+    #[must_use]
+    pub fn press(&self, plan: &Plan) -> f64 {
+        match () {
+            () if self.n > 0.0 => self.mean.press / self.n,
+            () if self.coarse => self.first_press,
+            () => plan.press_max,
+        }
     }
 
     /// Stiffness of drive and stop in series, mean of the measured touches, in the unit of the input per mm.

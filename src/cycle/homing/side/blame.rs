@@ -146,7 +146,8 @@ impl Side {
             fault(GIB_ERR_HOMING_TORQUE_STUCK, "torque\0", self.reading, plan.release)
         } else if stayed || above > high + 4.0 * FILTERED * self.noise() {
             // A stop pushes the axis back; a tight spot takes as much torque above what sliding takes both ways.
-            fault(GIB_ERR_HOMING_TIGHT_SPOT, "torque\0", -self.lowest, plan.limit)
+            let code = if self.stuck(plan) { GIB_ERR_HOMING_TORQUE_STUCK } else { GIB_ERR_HOMING_TIGHT_SPOT };
+            fault(code, "torque\0", -self.lowest, plan.limit)
         } else {
             None
         }
