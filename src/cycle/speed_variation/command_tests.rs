@@ -57,6 +57,38 @@ fn amplitude_and_period_are_kept_over_a_hundred_periods() {
     }
 }
 
+/// What cutting takes while the speed goes back to its mean, and in the very input that ends the variation, is left to it.
+#[test]
+fn the_way_back_leaves_cutting_its_share() {
+    for (waveform, period_s) in [(GIB_SPEED_VARIATION_TRIANGLE, 2.0), (GIB_SPEED_VARIATION_SINE, 2.5)] {
+        for end in [asked(1000.0), asked(f64::NAN)] {
+            for cutting_at in [0, 30] {
+                let mut machine =
+                    started(&SpeedVariationConfig { waveform, period_s, amplitude_ratio: 0.4, ..config() });
+                while machine.step(&asked(1000.0)).speed_command_rpm > 650.0 {}
+                let (mut last, mut rose, mut cycle) = (machine.output().speed_command_rpm, 0, 0);
+                loop {
+                    let cutting_nm = if cycle >= cutting_at { 80.0 } else { 0.0 };
+                    let out =
+                        *machine.step(&SpeedVariationInput { flags: GIB_SPEED_VARIATION_STOP, cutting_nm, ..end });
+                    let (before, now) = (rad_s_from_rpm(last), rad_s_from_rpm(out.speed_command_rpm));
+                    if now > before {
+                        rose += 1;
+                        let power = (0.5 * (now - before) / 0.001 + cutting_nm) * now;
+                        assert!(power <= 1e4, "{waveform} {cutting_at}: {power} W in cycle {cycle}");
+                    }
+                    last = out.speed_command_rpm;
+                    cycle += 1;
+                    if out.status != GIB_BUSY {
+                        break;
+                    }
+                }
+                assert!(rose > 50 && (last - 1000.0).abs() < 1e-6, "{rose} {last}");
+            }
+        }
+    }
+}
+
 /// A corner that is met exactly turns the slope, though the change of that cycle is still the old one.
 #[test]
 fn corners_met_exactly_turn_the_slope() {

@@ -10,7 +10,7 @@ mod quick;
 use super::config::SpeedVariationLimits;
 use super::io::*;
 use super::limit::{Motor, Wave};
-use super::plan::{Plan, code};
+use super::plan::{MOST_CUTTING, Plan, code};
 use crate::cycle::backlash::io::{GIB_INPUT_ABORT, GIB_INPUT_FAULT};
 use crate::error::{
     Fault, GIB_BUSY, GIB_DONE, GIB_ERR_ABORTED, GIB_ERR_CONFIG, GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE,
@@ -281,7 +281,7 @@ impl SpeedVariation {
                     self.leave(fault);
                 }
                 if self.phase == Phase::Stopping {
-                    self.go_back();
+                    self.go_back(input);
                 }
             }
             Phase::Begin | Phase::Running => {
@@ -294,7 +294,7 @@ impl SpeedVariation {
                 }
                 self.seen = pairs(input);
                 if self.phase == Phase::Stopping {
-                    self.go_back();
+                    self.go_back(input);
                 }
             }
         }
@@ -352,8 +352,12 @@ impl SpeedVariation {
         left.max(0.0) * self.per_nm / (1.0 + OVERSHOOT)
     }
 
-    /// One cycle back toward the mean.
-    fn go_back(&mut self) {
+    /// One cycle back toward the mean, with what cutting leaves now, whatever else is wrong with the input.
+    fn go_back(&mut self, input: &SpeedVariationInput) {
+        if (0.0..=MOST_CUTTING).contains(&input.cutting_nm) {
+            self.motor.used = self.plan.motor_cutting(input.cutting_nm).used;
+            self.brake_help = self.motor.used + self.plan.motor.used;
+        }
         let missing = self.mean - self.speed;
         self.go(missing.max(-self.back).min(self.back));
         self.patience = self.patience.saturating_sub(1);

@@ -44,6 +44,8 @@ pub struct Plan {
     pub chatter_hz: Option<f64>,
 }
 
+/// Largest torque that cutting may use, N·m.
+pub const MOST_CUTTING: f64 = 1e6;
 /// Shortest and longest period, s.
 const PERIODS: [f64; 2] = [0.02, 600.0];
 /// Smallest amplitude that counts as one.
@@ -97,7 +99,7 @@ impl Plan {
                 used: in_range("coulomb_nm\0", c.coulomb_nm, 0.0, 1e6)?,
                 viscous: in_range("viscous_nm_s\0", c.viscous_nm_s, 0.0, 1e6)?,
             },
-            cutting: in_range("cutting_nm\0", c.cutting_nm, 0.0, 1e6)?,
+            cutting: in_range("cutting_nm\0", c.cutting_nm, 0.0, MOST_CUTTING)?,
             sense: speed.signum(),
             mean: rad_s_from_rpm(speed.abs()),
             amplitude: in_range("amplitude_ratio\0", c.amplitude_ratio, 0.0, MOST)?,
@@ -191,7 +193,7 @@ impl Plan {
             rad_s_from_rpm(speed),
             amplitude,
             in_range("period_s\0", period, PERIODS[0].max(8.0 * self.cycle_s), PERIODS[1])?,
-            in_range("cutting_nm\0", cutting, 0.0, 1e6)?,
+            in_range("cutting_nm\0", cutting, 0.0, MOST_CUTTING)?,
         ])
     }
 }
