@@ -148,9 +148,9 @@ __attribute__((noinline, cold)) static int measuring(struct __comp_state *__comp
     status = gib_inertia_step(gib, &in, &out);
     if (running && status != GIB_BUSY) {
         running = 0;
-        done = status == GIB_DONE;
-        error = done ? 0 : status;
-        if (gib_inertia_result(gib, &report) == GIB_OK && done) {
+        error = status == GIB_DONE ? gib_inertia_result(gib, &report) : status;
+        done = error == GIB_OK; /* what the motion does not determine is no value */
+        if (done) {
             inertia = report.workpiece_kg_m2;
             uncertainty = report.workpiece_uncertainty_kg_m2;
             coulomb = report.coulomb_nm;
