@@ -97,6 +97,38 @@ static void every_fault_is_named_and_safe(void **state)
     }
 }
 
+/* Out at once after contact, with a restore that nobody acknowledges: meanwhile no torque winds up against the stop. */
+static void no_torque_while_the_restore_is_waited_for(void **state)
+{
+    (void)state;
+    static homing_world w, copy;
+    for (size_t i = 0; i < VARIANT_COUNT; i++) {
+        begin(&w, &VARIANTS[i]);
+        gib_homing_config g = w.config;
+        homing_plant_config c = w.plant.c;
+        g.ack_timeout_s = 1.0;
+        assert_int_equal(homing_world_start(&w, &c, &g), GIB_OK);
+        while (homing_world_state(&w) != IN_PRESS) {
+            homing_world_step(&w);
+        }
+        for (int k = 0; k < 40; k++) {
+            memcpy(&copy, &w, sizeof copy);
+            copy.plant.fault = FAULT_NO_ACKNOWLEDGEMENT;
+            gib_homing_abort(homing_world_gib(&copy));
+            while (copy.status == GIB_BUSY) {
+                homing_world_step(&copy);
+            }
+            assert_int_equal(copy.status, GIB_ERR_ABORTED);
+            for (int m = 0; m < c.motors; m++) {
+                if (fabs(copy.plant.side[m].torque) > 0.5 * g.torque_limit_nm) {
+                    fail_msg("variant %zu, cycle %d: %.2f N.m at rest", i, w.cycles, copy.plant.side[m].torque);
+                }
+            }
+            homing_world_step(&w);
+        }
+    }
+}
+
 /* The judge itself can say no. */
 static void the_judge_sees_what_is_unsafe(void **state)
 {
@@ -187,6 +219,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(aborted_at_every_cycle),
         cmocka_unit_test(every_fault_is_named_and_safe),
+        cmocka_unit_test(no_torque_while_the_restore_is_waited_for),
         cmocka_unit_test(the_judge_sees_what_is_unsafe),
         cmocka_unit_test(calls_in_the_wrong_order),
     };

@@ -2190,7 +2190,7 @@ typedef struct gib_homing_config {
      */
     double acceleration_mm_s2;
     /**
-     * Torque limit that the drive shall have in force until homing ends, N·m. Required.
+     * Torque limit that the drive shall have in force until homing ends, 1e-6 to 1e6 N·m. Required.
      */
     double torque_limit_nm;
     /**
@@ -2199,7 +2199,7 @@ typedef struct gib_homing_config {
      */
     double torque_tolerance_nm;
     /**
-     * The axis stands when slower than this, mm/s (default a fifth of the touch speed, 0.05 at least).
+     * The axis stands when slower than this, 1e-6 mm/s to the approach speed (default a fifth of the touch speed, 0.05 at least).
      */
     double detection_velocity_mm_s;
     /**
@@ -2207,27 +2207,27 @@ typedef struct gib_homing_config {
      */
     double detection_time_s;
     /**
-     * Smallest way to the stop, mm (default 0): a stop before it is a fault.
+     * Smallest way to the stop, 0 (default) to `distance_max_mm`: a stop before it is a fault.
      */
     double distance_min_mm;
     /**
-     * Largest way that the axis may go toward the stop, mm. Required.
+     * Largest way that the axis may go toward the stop, 0.001 to 100000 mm. Required.
      */
     double distance_max_mm;
     /**
-     * Time for the whole homing, s (default: what its ways take, twice, and 10 s).
+     * Time for the whole homing, a cycle to 100000 s (default: what its ways take, twice, and 10 s).
      */
     double time_limit_s;
     /**
-     * Largest |target - position|, up to 100 mm (default 1 mm and the way of 0.1 s).
+     * Largest |target - position|, 0.001 to 100 mm (default 1 mm and the way of 0.1 s).
      */
     double lag_limit_mm;
     /**
-     * Coordinate of the place where the axis stands when homed, mm.
+     * Coordinate of the place where the axis stands when homed, -1e6 to 1e6 mm (default 0).
      */
     double set_position_mm;
     /**
-     * Way from the contact point to that place, away from the stop, up to 1000 mm.
+     * Way from the contact point to that place, away from the stop, 0 (default) to 1000 mm.
      */
     double zero_offset_mm;
     /**
@@ -2239,7 +2239,7 @@ typedef struct gib_homing_config {
      */
     double retract_mm;
     /**
-     * Largest way from contact to the torque limit, up to 0.4 of the retraction (default): more is a soft stop.
+     * Largest way from contact to the torque limit, 0.0001 mm to 0.4 of the retraction (default): more is a soft stop.
      */
     double press_max_mm;
     /**
@@ -2247,7 +2247,7 @@ typedef struct gib_homing_config {
      */
     double touch_tolerance_um;
     /**
-     * Gantry: largest difference of the two sides, mm (default 0.2).
+     * Gantry: largest difference of the two sides, 0.001 to 100 mm (default 0.2).
      */
     double square_tolerance_mm;
     /**
@@ -2255,7 +2255,7 @@ typedef struct gib_homing_config {
      */
     double ack_timeout_s;
     /**
-     * Rated torque, N·m. Required for `GIB_TORQUE_PERMILLE`.
+     * Rated torque, 1e-6 to 1e6 N·m. Required for `GIB_TORQUE_PERMILLE`.
      */
     double rated_torque_nm;
 } gib_homing_config;

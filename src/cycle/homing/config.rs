@@ -52,40 +52,40 @@ pub struct HomingConfig {
     pub touch_speed_mm_s: f64,
     /// Largest commanded acceleration, 0.1 to 10000 mm/s² (default 50).
     pub acceleration_mm_s2: f64,
-    /// Torque limit that the drive shall have in force until homing ends, N·m. Required.
+    /// Torque limit that the drive shall have in force until homing ends, 1e-6 to 1e6 N·m. Required.
     pub torque_limit_nm: f64,
     /// The torque counts as limiting within this of the limit, and beyond the limit by this it is a fault, N·m;
     /// 1 to 30 % of the limit (default 10 %).
     pub torque_tolerance_nm: f64,
-    /// The axis stands when slower than this, mm/s (default a fifth of the touch speed, 0.05 at least).
+    /// The axis stands when slower than this, 1e-6 mm/s to the approach speed (default a fifth of the touch speed, 0.05 at least).
     pub detection_velocity_mm_s: f64,
     /// Time for which the torque must be limiting and the axis stand, 8 cycles to 5 s (default 0.1).
     pub detection_time_s: f64,
-    /// Smallest way to the stop, mm (default 0): a stop before it is a fault.
+    /// Smallest way to the stop, 0 (default) to `distance_max_mm`: a stop before it is a fault.
     pub distance_min_mm: f64,
-    /// Largest way that the axis may go toward the stop, mm. Required.
+    /// Largest way that the axis may go toward the stop, 0.001 to 100000 mm. Required.
     pub distance_max_mm: f64,
-    /// Time for the whole homing, s (default: what its ways take, twice, and 10 s).
+    /// Time for the whole homing, a cycle to 100000 s (default: what its ways take, twice, and 10 s).
     pub time_limit_s: f64,
-    /// Largest |target - position|, up to 100 mm (default 1 mm and the way of 0.1 s).
+    /// Largest |target - position|, 0.001 to 100 mm (default 1 mm and the way of 0.1 s).
     pub lag_limit_mm: f64,
-    /// Coordinate of the place where the axis stands when homed, mm.
+    /// Coordinate of the place where the axis stands when homed, -1e6 to 1e6 mm (default 0).
     pub set_position_mm: f64,
-    /// Way from the contact point to that place, away from the stop, up to 1000 mm.
+    /// Way from the contact point to that place, away from the stop, 0 (default) to 1000 mm.
     pub zero_offset_mm: f64,
     /// Speed of that move, 0.01 to 500 mm/s (default: the approach speed).
     pub zero_offset_speed_mm_s: f64,
     /// Way back from the stop between touches, 0.05 to 100 mm (default 1). More than twice the lost motion.
     pub retract_mm: f64,
-    /// Largest way from contact to the torque limit, up to 0.4 of the retraction (default): more is a soft stop.
+    /// Largest way from contact to the torque limit, 0.0001 mm to 0.4 of the retraction (default): more is a soft stop.
     pub press_max_mm: f64,
     /// Touches may differ by this, 0.1 to 1000 µm (default 5), besides their own uncertainty.
     pub touch_tolerance_um: f64,
-    /// Gantry: largest difference of the two sides, mm (default 0.2).
+    /// Gantry: largest difference of the two sides, 0.001 to 100 mm (default 0.2).
     pub square_tolerance_mm: f64,
     /// Time within which a request must be acknowledged, 2 cycles to 60 s (default 1).
     pub ack_timeout_s: f64,
-    /// Rated torque, N·m. Required for `GIB_TORQUE_PERMILLE`.
+    /// Rated torque, 1e-6 to 1e6 N·m. Required for `GIB_TORQUE_PERMILLE`.
     pub rated_torque_nm: f64,
 }
 

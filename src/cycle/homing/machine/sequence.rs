@@ -388,7 +388,8 @@ impl Homing {
         for side in self.sides.iter_mut().take(plan.motors) {
             let behind = plan.sense * (side.profile.position - side.position) > 0.1 * plan.press_max;
             let loaded = side.pressing(&plan) || behind;
-            let goal = if loaded { side.position - plan.sense * plan.press_max } else { side.profile.position };
+            // A command that stays ahead would wind the servo up against what it touches while the restore is waited for.
+            let goal = side.position - if loaded { plan.sense * plan.press_max } else { 0.0 };
             bound = bound.max(side.go(&plan, goal, plan.approach));
         }
         self.enter(Phase::Unload, bound + plan.settling());
