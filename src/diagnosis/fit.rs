@@ -111,6 +111,15 @@ impl<'f, 'a> Bench<'f, 'a> {
         shapes.into_iter().zip(terms).map(part).collect()
     }
 
+    /// The same equations with one more column that is free in every fit.
+    #[must_use]
+    pub fn beside(&self, column: &Trace) -> Self {
+        let mut free = self.free.clone();
+        free.push(orthonormal(&self.stack(column), &free).0);
+        let (measured, known, windows) = (self.measured.clone(), self.known.clone(), self.windows.clone());
+        Self { free, measured, known, windows, ..*self }
+    }
+
     /// What is left, channel by channel, in their own units; rows of the torque by their weight.
     #[must_use]
     pub fn rest(&self, fit: &Fit) -> [Vec<f64>; 2] {

@@ -137,6 +137,16 @@ fn half_of_rows(bench: &Bench, time_s: &[f64]) -> Vec<usize> {
     time_s.iter().map(of).collect()
 }
 
+/// The gain in how far the table is from the motor, where both are recorded and simulated. In the simulated table's own place
+/// the motor's following error is by far the most, with which what a spring does may happen to go.
+#[must_use]
+pub fn of_stretch(before: Option<&Errors>, after: Option<&Errors>) -> Option<Gain> {
+    let stretch = |[_, motor, table]: &Errors| -> Option<Vec<f64>> {
+        Some(table.as_ref()?.iter().zip(motor.as_ref()?).map(|(table, motor)| table - motor).collect())
+    };
+    gain("table_position - position", &stretch(before?)?, &stretch(after?)?)
+}
+
 fn gains(axis: &Axis, before: &Errors, after: &Errors) -> Vec<Gain> {
     let names = [axis.drive.torque_word(), "position", "table_position"];
     let pairs = names.into_iter().zip(before.iter().zip(after));

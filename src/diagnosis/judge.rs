@@ -7,10 +7,11 @@
 //! driven by, may explain what was measured and yet make a wrong machine.
 
 use super::fit::{Bench, Fit};
+use super::foreign;
 use super::frame::Columns;
-use super::gain::{Errors, Gain, HeldOut};
+use super::gain::{self, Errors, Gain, HeldOut};
 use super::progress::{Stopped, Watch};
-use super::select::Selection;
+use super::select::{LEAST_GAIN, Selection};
 use super::show::{self, Coordinate};
 use super::verdict::Verdict;
 use crate::machine::{Axis, Cause};
@@ -30,9 +31,14 @@ const MOSTLY: f64 = 2.0 / 3.0;
 /// leave a hundredth of that; several of a wrong form together imitate a curve, and leave more.
 const MOST_OF_A_CURVE: f64 = 0.03;
 
+/// Least ratio of what a machine errs by without a spring or clearance over what it errs by with it. In the balance a cause must
+/// take 4 % off the amplitude of what is left; a row as it was measured holds more noise.
+const LEAST_RATIO: f64 = 1.02;
+
 /// What stays the same while sets of causes are judged.
 pub struct Judge<'j, 'f, 'a> {
     bench: &'j Bench<'f, 'a>,
+    watch: &'j Watch<'j>,
     held_out: HeldOut<'j, 'f, 'a>,
     /// The fit without a cause, and its errors on held-out blocks.
     empty: Fit,
@@ -58,7 +64,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     pub fn new(axis: &'j Axis, whole: &Columns, bench: &'j Bench<'f, 'a>, watch: &'j Watch<'j>) -> Self {
         let (held_out, empty) = (HeldOut::new(axis, whole, bench, watch), bench.fit(Vec::new()));
         let believed = held_out.believed();
-        Self { bench, held_out, empty, believed }
+        Self { bench, watch, held_out, empty, believed }
     }
 
     /// Judges a set of causes.
@@ -67,10 +73,16 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     /// [`Stopped`] when the watch's caller said so.
     pub fn judge(&self, mut found: Selection) -> Result<Judged, Stopped> {
         let Some(mut verdict) = self.explains(&found.fit) else { return Ok(self.nothing(&found)) };
+        if let Some(goes) = self.foreign(&found.fit)? {
+            return Ok(Judged { refutation: Some(imitation(&found.fit, goes)), ..self.nothing(&found) });
+        }
         let mut errors = self.held_out.errors(&found.fit)?;
         if let Some(less) = self.without_spring(&found.fit) {
             let without = if less.parts.is_empty() { self.believed.clone() } else { self.held_out.errors(&less)? };
-            if is_idle(&self.held_out.gains(without.as_ref(), errors.as_ref())) {
+            let mut gains = self.held_out.gains(without.as_ref(), errors.as_ref());
+            gains.retain(|gain| gain.channel != "table_position");
+            gains.extend(gain::of_stretch(without.as_ref(), errors.as_ref()));
+            if is_idle(&gains) {
                 (found.fit, errors) = (less, without);
                 let Some(still) = self.explains(&found.fit) else { return Ok(self.nothing(&found)) };
                 verdict = still;
@@ -83,6 +95,12 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let causes = found.fit.parts.iter().map(|p| p.law.cause);
         let refutation = refutation(causes, &gains, "rows that it was not fitted to");
         Ok(Judged { refutation: Some(refutation), ..self.nothing(&found) })
+    }
+
+    /// How what was found goes in truth, where that has no name; what leaves nothing above the noise is it.
+    fn foreign(&self, fit: &Fit) -> Result<Option<&'static str>, Stopped> {
+        let leaves = Excess::of(self.bench, fit, fit).largest() > LEAST_GAIN;
+        if leaves { foreign::stands_for(self.bench, &self.empty, fit, self.watch) } else { Ok(None) }
     }
 
     /// A set without what is simulated behind the measured motion (a spring, a clearance), where that may gain by taking off what
@@ -145,19 +163,28 @@ fn is_another_curve(bench: &Bench, empty: &Fit, fit: &Fit) -> bool {
         })
 }
 
-/// Whether a machine is known to be worse than the belief: surely so in torque or motor position, and in both together. The
-/// simulated table carries the motor's error along, with which what the table does may happen to go.
+/// Whether a machine is no better than the belief: worse in torque and motor position together, and surely so in one of them
+/// or surely better in none. The simulated table carries the motor's error along, with which what the table does may happen to
+/// go.
 #[must_use]
 pub fn refuted(gains: &[Gain]) -> bool {
     let motor = || gains.iter().filter(|gain| gain.channel != "table_position");
-    motor().any(|gain| gain.ci95[1] < 1.0) && motor().map(|gain| (gain.before / gain.after).ln()).sum::<f64>() < 0.0
+    let surely_better = gains.iter().any(|gain| gain.ci95[0] > 1.0);
+    let surely_worse = motor().any(|gain| gain.ci95[1] < 1.0);
+    motor().map(|gain| (gain.before / gain.after).ln()).sum::<f64>() < 0.0 && (surely_worse || !surely_better)
 }
 
-/// Whether the machine is known to be worse with a cause, or not known to be better in any channel: what such a cause gains in
-/// the balance is none of the machine's.
+/// Whether the machine is worse with a cause, or not known to be better in any channel by what can be seen: what such a cause
+/// gains in the balance is none of the machine's.
 fn is_idle(gains: &[Gain]) -> bool {
-    let no_better = !gains.is_empty() && gains.iter().all(|gain| gain.ci95[0] <= 1.0);
-    no_better || refuted(gains)
+    let better = |gain: &Gain| gain.ci95[0] > 1.0 && gain.before > LEAST_RATIO * gain.after;
+    !gains.is_empty() && !gains.iter().any(better) || refuted(gains)
+}
+
+/// Says what imitates a law that has no name.
+fn imitation(fit: &Fit, goes: &str) -> String {
+    let causes: Vec<&str> = fit.parts.iter().map(|part| part.law.cause.name()).collect();
+    format!("{} would explain much, but what is there goes {goes}, for which gib has no name", causes.join(" with "))
 }
 
 /// Says what causes are refuted, and by which rows.

@@ -3,7 +3,7 @@
 //! A recording is turned into one system of equations (`frame`: motion, direction, judged rows; `filter`: the low-pass that
 //! both sides go through). `causes` holds one law a cause; `fit` solves for a set of them, `select` finds the set,
 //! `uncertainty` says how sure its parameters are, `gain` what the extended machine is worth on rows it was not fitted to,
-//! `judge` whether anything is to be named at all, and `verdict` the whole answer.
+//! `judge` whether anything is to be named at all (`foreign`: or is what has no name), and `verdict` the whole answer.
 //!
 //! T_measured(t + delay) = J·α + Tv·ω + Tc·sign(ω) + T0 + Σ causes, in the drive's own unit (N·m, or N for linear).
 
@@ -16,6 +16,7 @@ mod columns;
 pub mod experiment;
 pub mod filter;
 pub mod fit;
+mod foreign;
 pub mod frame;
 pub mod gain;
 mod json;

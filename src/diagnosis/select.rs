@@ -150,7 +150,7 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     }
     let start = best.pop().unwrap_or_else(|| search.bench.fit(Vec::new()));
     // What only several numbers of the belief together explain, others may have imitated one by one.
-    let open = idle_left_out(search, search.with_beliefs(&start))?;
+    let open = idle_left_out(search.bench, search.with_beliefs(&start), search.watch)?;
     let start = if price(&open) < price(&start) { open } else { start };
     let fit = shrink(search.bench, start, search.watch)?;
     rivals.retain(|r| r.parts.len() == fit.parts.len() && !same_causes(r, &fit));
@@ -276,13 +276,16 @@ fn is_physical(bench: &Bench, fit: &Fit) -> bool {
 }
 
 /// Drops causes that the others do without as they are, weakest first: refined, the others would do without them all the more.
-fn idle_left_out(search: &Search, mut fit: Fit) -> Result<Fit, Stopped> {
+///
+/// # Errors
+/// [`Stopped`] when the watch's caller said so.
+pub fn idle_left_out(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
     loop {
         let each: Vec<usize> = (0..fit.parts.len()).collect();
-        let without = search.watch.each(&each, (0.8, 0.8), "leaving out what is not needed", |&i| {
+        let without = watch.each(&each, (0.8, 0.8), "leaving out what is not needed", |&i| {
             let mut parts = fit.parts.clone();
             parts.remove(i);
-            search.bench.fit(parts)
+            bench.fit(parts)
         })?;
         let weakest = without.into_iter().min_by(|a, b| price(a).total_cmp(&price(b)));
         match weakest.filter(|less| price(less) - price(&fit) < LEAST_GAIN) {
