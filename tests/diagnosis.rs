@@ -130,6 +130,22 @@ fn a_bump_of_friction_at_one_speed_is_no_sum_of_frictions() {
 }
 
 #[test]
+fn a_law_without_a_name_is_not_imitated_by_several_that_have_one() {
+    /// Torque of time, position, speed and acceleration.
+    type Extra = fn(f64, f64, f64, f64) -> f64;
+    let laws: [(&str, Extra); 3] = [
+        ("cube of speed", |_, _, v, _| 0.15 * (v / 60.0).powi(3)),
+        ("step along the stroke", |_, x, _, _| if x > 104.0 { 0.1 } else { -0.1 }),
+        ("grows with acceleration", |_, _, v, a| 0.2 * v.signum() * (a / 150.0).abs()),
+    ];
+    for (goes, law) in laws {
+        let d = judged(&recording(law));
+        assert_eq!((d.verdict, d.findings.len()), (Verdict::UnknownCause, 0), "{goes}: {d:?}");
+        assert!(d.notes.iter().any(|note| note.contains(goes)), "{goes}: {:?}", d.notes);
+    }
+}
+
+#[test]
 fn what_fits_nothing_is_called_unknown() {
     // A torque that jumps between levels at irregular times.
     let level = |t: f64| if ((t * 0.37).sin() + (t * 0.83).sin()) > 0.2 { 0.25 } else { -0.25 };

@@ -91,7 +91,9 @@ impl<'f, 'a> Bench<'f, 'a> {
         bench
     }
 
-    fn stack(&self, trace: &Trace) -> Vec<f64> {
+    /// A trace as a column: torque and table − encoder stacked, each over its noise floor.
+    #[must_use]
+    pub fn stack(&self, trace: &Trace) -> Vec<f64> {
         let rows = self.frame.kept.len();
         let mut column = vec![0.0; if self.frame.columns.table.is_some() { 2 * rows } else { rows }];
         let weighted = trace.torque.iter().zip(&self.frame.weights);
@@ -111,11 +113,11 @@ impl<'f, 'a> Bench<'f, 'a> {
         shapes.into_iter().zip(terms).map(part).collect()
     }
 
-    /// The same equations with one more column that is free in every fit.
+    /// The same equations with more columns that are free in every fit.
     #[must_use]
-    pub fn beside(&self, column: &Trace) -> Self {
+    pub fn beside(&self, columns: impl Iterator<Item = Trace>) -> Self {
         let mut free = self.free.clone();
-        free.push(orthonormal(&self.stack(column), &free).0);
+        columns.for_each(|column| free.push(orthonormal(&self.stack(&column), &free).0));
         let (measured, known, windows) = (self.measured.clone(), self.known.clone(), self.windows.clone());
         Self { free, measured, known, windows, ..*self }
     }

@@ -5,69 +5,149 @@
 use super::causes::Trace;
 use super::fit::{Bench, Fit};
 use super::frame::Frame;
+use super::many::dot;
 use super::progress::{Stopped, Watch};
-use super::select::{LEAST_GAIN, idle_left_out};
+use super::select::{LEAST_GAIN, NUMBER_PRICE, idle_left_out, price};
 
 /// Share of what causes explain that a law without a name must stand for, for none of them to be named.
 const MOST: f64 = 0.5;
-/// Places along the stroke and over the speed at which something may begin or lie.
+/// Least share of it that such a law explains by itself, for it to be looked at.
+const LEAST: f64 = 0.3;
+/// What a law without a name must bring to take the place of as many causes; fewer it replaces where it is as good.
+const FOR_AS_MANY: f64 = LEAST_GAIN;
+/// Places along the stroke and over the speed at which something may begin or lie, and how often the way between two of them is
+/// halved.
 const PLACES: usize = 24;
+const HALVED: i32 = 5;
+
+/// What is said while it is done.
+const STAGE: &str = "comparing with laws without a name";
 
 /// A law without a name.
 struct Foreign {
     /// What the torque does, as said to a machinist.
     goes: &'static str,
-    /// The regressor, drive's own unit or anything in proportion.
-    trace: Vec<f64>,
+    /// Numbers that it takes: its size, and where it begins or lies.
+    numbers: usize,
+    /// Whether it begins or lies somewhere.
+    somewhere: bool,
+    /// Regressors at a share of the stroke or of the top speed, drive's own unit or anything in proportion; if there are several,
+    /// they do not overlap.
+    regressors: fn(&Frame, f64) -> Vec<Vec<f64>>,
 }
 
-/// How what was found goes in truth, where a law without a name stands for most of it.
+static LAWS: [Foreign; 7] = [
+    Foreign {
+        goes: "with the cube of speed",
+        numbers: 1,
+        somewhere: false,
+        regressors: |frame, _| vec![frame.judged_by(|i| frame.v[i].powi(3))],
+    },
+    Foreign {
+        goes: "as a friction that grows with acceleration",
+        numbers: 1,
+        somewhere: false,
+        regressors: |frame, _| vec![frame.judged_by(|i| frame.direction[i] * frame.a[i].abs())],
+    },
+    Foreign {
+        goes: "as a friction that grows with the load",
+        numbers: 1,
+        somewhere: false,
+        regressors: |frame, _| vec![frame.judged_by(|i| frame.direction[i] * load(frame, i).abs())],
+    },
+    Foreign {
+        goes: "as a step along the stroke",
+        numbers: 3,
+        somewhere: true,
+        regressors: |frame, share| on_either_side(frame, share, |_| 1.0),
+    },
+    Foreign {
+        goes: "as a step of friction along the stroke",
+        numbers: 3,
+        somewhere: true,
+        regressors: |frame, share| on_either_side(frame, share, |i| frame.direction[i]),
+    },
+    Foreign {
+        goes: "as a friction that is another about one speed",
+        numbers: 3,
+        somewhere: true,
+        regressors: |frame, share| vec![about(frame, share, 1.5)],
+    },
+    Foreign {
+        goes: "as a friction that is another about one speed",
+        numbers: 3,
+        somewhere: true,
+        regressors: |frame, share| vec![about(frame, share, 4.0)],
+    },
+];
+
+/// How what was found goes in truth, where a law without a name stands for most of it: where it makes causes needless that
+/// explain more than half, and explains more than they do, or as much in place of two of them or more.
 ///
 /// # Errors
 /// [`Stopped`] when the watch's caller said so.
 pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Result<Option<&'static str>, Stopped> {
-    let laws = laws(bench.frame);
-    let beside = watch.each(&laws, (0.9, 0.91), "comparing with laws without a name", |law| {
-        let with = bench.beside(&Trace::torque(law.trace.clone()));
-        let fit = with.fit(found.parts.clone());
-        (fit.figure(), with)
-    })?;
-    let best = laws.iter().zip(beside).min_by(|a, b| a.1.0.total_cmp(&b.1.0));
-    let Some((law, (_, with))) = best.filter(|(_, (figure, _))| *figure < found.figure() - LEAST_GAIN) else {
-        return Ok(None);
+    let explained = empty.squares() - found.squares();
+    // What a law explains at a place by itself, over what was found explains.
+    let alike = |law: &Foreign, place: f64| {
+        let columns = (law.regressors)(bench.frame, place).into_iter().map(|c| bench.stack(&Trace::torque(c)));
+        let squares = |column: Vec<f64>| dot(&column, &empty.residual).powi(2) / dot(&column, &column).max(1e-300);
+        columns.map(squares).sum::<f64>() / explained.max(1e-300)
     };
-    let left = idle_left_out(&with, with.fit(found.parts.clone()), watch)?;
-    // What the causes that are left would explain by themselves.
-    let own = bench.fit(left.parts);
-    let (explained, lost) = (empty.squares() - found.squares(), own.squares() - found.squares());
-    Ok((lost > MOST * explained).then_some(law.goes))
-}
-
-fn laws(frame: &Frame) -> Vec<Foreign> {
-    let (low, high) = frame.stroke();
-    let law = |goes, trace| Foreign { goes, trace };
-    let friction = |of: &dyn Fn(usize) -> f64| frame.judged_by(|i| frame.direction[i] * of(i));
-    let b = &frame.belief;
-    let load = |i: usize| {
-        let motion = b.inertia * frame.a[i] * frame.unit + b.viscous * frame.v[i] * frame.unit;
-        motion + b.coulomb * frame.direction[i] + b.constant
+    let first_place = |law: &&'static Foreign| {
+        let places = if law.somewhere { 1..PLACES } else { 0..1 };
+        let tried = places.map(|place| place as f64 / PLACES as f64).map(|place| (alike(law, place), *law, place));
+        tried.max_by(|a, b| a.0.total_cmp(&b.0))
     };
-    let mut laws = vec![
-        law("with the cube of speed", frame.judged_by(|i| frame.v[i].powi(3))),
-        law("as a friction that grows with acceleration", friction(&|i| frame.a[i].abs())),
-        law("as a friction that grows with the load", friction(&|i| load(i).abs())),
-    ];
-    for place in 1..PLACES {
-        let share = place as f64 / PLACES as f64;
-        let (x, v) = (low + share * (high - low), share * frame.top_speed());
-        let beyond = |i: usize| f64::from(u8::from(frame.x[i] > x));
-        laws.push(law("as a step along the stroke", frame.judged_by(beyond)));
-        laws.push(law("as a step of friction along the stroke", friction(&beyond)));
-        for width in [1.5, 4.0] {
-            let width = width * frame.top_speed() / PLACES as f64;
-            let trace = frame.fading(|i| ((frame.v[i].abs() - v) / width).powi(2));
-            laws.push(law("as a friction that is another about one speed", trace));
+    let laws: Vec<&'static Foreign> = LAWS.iter().collect();
+    let mut near: Vec<(f64, &'static Foreign, f64)> =
+        watch.each(&laws, (0.9, 0.91), STAGE, first_place)?.into_iter().flatten().collect();
+    near.retain(|(share, ..)| *share > LEAST);
+    near.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (_, law, place) in near {
+        let beside = |place: f64| {
+            let with = bench.beside((law.regressors)(bench.frame, place).into_iter().map(Trace::torque));
+            let fit = with.fit(found.parts.clone());
+            (with, fit)
+        };
+        let (mut at, (mut with, mut fit)) = (place, beside(place));
+        for halved in 1..=if law.somewhere { HALVED } else { 0 } {
+            let step = 0.5f64.powi(halved) / PLACES as f64;
+            let sides = watch.each(&[at - step, at + step], (0.91, 0.91), STAGE, |place| (*place, beside(*place)))?;
+            for (place, (there, nearer)) in sides {
+                if nearer.squares() < fit.squares() {
+                    (at, with, fit) = (place, there, nearer);
+                }
+            }
+        }
+        let left = idle_left_out(&with, fit, watch)?;
+        let needless = found.parts.len() - left.parts.len();
+        let better = price(found) - price(&left) - NUMBER_PRICE * law.numbers as f64;
+        // What the causes that are still needed explain by themselves.
+        let own = bench.fit(left.parts).squares() - found.squares();
+        let least = if needless > 1 { 0.0 } else { FOR_AS_MANY };
+        if needless > 0 && better > least && own > MOST * explained {
+            return Ok(Some(law.goes));
         }
     }
-    laws
+    Ok(None)
+}
+
+/// Torque that moves the axis as believed.
+fn load(frame: &Frame, i: usize) -> f64 {
+    let b = &frame.belief;
+    (b.inertia * frame.a[i] + b.viscous * frame.v[i]) * frame.unit + b.coulomb * frame.direction[i] + b.constant
+}
+
+/// What a function of the row is below a place and beyond it.
+fn on_either_side(frame: &Frame, share: f64, of: impl Fn(usize) -> f64) -> Vec<Vec<f64>> {
+    let (low, high) = frame.stroke();
+    let place = low + share * (high - low);
+    [false, true].map(|beyond| frame.judged_by(|i| if (frame.x[i] > place) == beyond { of(i) } else { 0.0 })).into()
+}
+
+/// Friction about one speed, over so many of the ways between two places.
+fn about(frame: &Frame, share: f64, ways: f64) -> Vec<f64> {
+    let top = frame.top_speed();
+    frame.fading(|i| ((frame.v[i].abs() / top - share) * PLACES as f64 / ways).powi(2))
 }

@@ -11,7 +11,7 @@ use super::foreign;
 use super::frame::Columns;
 use super::gain::{self, Errors, Gain, HeldOut};
 use super::progress::{Stopped, Watch};
-use super::select::{LEAST_GAIN, Selection};
+use super::select::Selection;
 use super::show::{self, Coordinate};
 use super::verdict::Verdict;
 use crate::machine::{Axis, Cause};
@@ -73,7 +73,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     /// [`Stopped`] when the watch's caller said so.
     pub fn judge(&self, mut found: Selection) -> Result<Judged, Stopped> {
         let Some(mut verdict) = self.explains(&found.fit) else { return Ok(self.nothing(&found)) };
-        if let Some(goes) = self.foreign(&found.fit)? {
+        if let Some(goes) = foreign::stands_for(self.bench, &self.empty, &found.fit, self.watch)? {
             return Ok(Judged { refutation: Some(imitation(&found.fit, goes)), ..self.nothing(&found) });
         }
         let mut errors = self.held_out.errors(&found.fit)?;
@@ -95,12 +95,6 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let causes = found.fit.parts.iter().map(|p| p.law.cause);
         let refutation = refutation(causes, &gains, "rows that it was not fitted to");
         Ok(Judged { refutation: Some(refutation), ..self.nothing(&found) })
-    }
-
-    /// How what was found goes in truth, where that has no name; what leaves nothing above the noise is it.
-    fn foreign(&self, fit: &Fit) -> Result<Option<&'static str>, Stopped> {
-        let leaves = Excess::of(self.bench, fit, fit).largest() > LEAST_GAIN;
-        if leaves { foreign::stands_for(self.bench, &self.empty, fit, self.watch) } else { Ok(None) }
     }
 
     /// A set without what is simulated behind the measured motion (a spring, a clearance), where that may gain by taking off what

@@ -33,7 +33,7 @@ const LEAST_AT_START: f64 = SHOWN_AT_START * LEAST_GAIN;
 /// The same of a ripple of few periods, which explains some of anything that is slow along the stroke: a third of what is left.
 const LEAST_OF_FEW: f64 = 0.4;
 /// What a further fitted number must gain where sets of causes compete.
-const NUMBER_PRICE: f64 = 0.003;
+pub const NUMBER_PRICE: f64 = 0.003;
 
 /// Least mean over scatter of the blocks' gains, times √blocks. What only one block shows gives exactly 1 and may count: the
 /// others predicted it, or the gain held out would not be there.
@@ -157,7 +157,9 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     Ok(Selection { fit, rivals })
 }
 
-fn price(fit: &Fit) -> f64 {
+/// What a set of causes costs: its figure, and its numbers.
+#[must_use]
+pub fn price(fit: &Fit) -> f64 {
     fit.figure() + NUMBER_PRICE * fit.numbers() as f64
 }
 

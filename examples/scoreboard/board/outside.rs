@@ -22,9 +22,13 @@ pub enum Kind {
     PulsingFriction { period: f64, phase: f64 },
     /// A conservative bump of torque at a place of the stroke: latch, detent, magnet (centre, width in load units).
     Detent { centre: f64, width: f64 },
+    /// Drag by the cube of speed (load units/s at which it is 1).
+    CubicDrag { speed: f64 },
+    /// A torque that begins at a place of the stroke: a wiper that only touches from there on.
+    ForceStep { at: f64 },
 }
 
-pub const NAMES: [&str; 8] = [
+pub const NAMES: [&str; 10] = [
     "stepped_friction",
     "wandering_torque",
     "bistable_offset",
@@ -33,6 +37,8 @@ pub const NAMES: [&str; 8] = [
     "speed_bump",
     "pulsing_friction",
     "detent",
+    "cubic_drag",
+    "force_step",
 ];
 
 #[derive(Clone, Debug)]
@@ -104,6 +110,8 @@ impl Outside {
                 centre: rig.reach.low + stroke * shape.uniform(0.3, 0.7),
                 width: stroke * shape.uniform(0.04, 0.1),
             },
+            "cubic_drag" => Kind::CubicDrag { speed: 0.7 * rig.reach.speed },
+            "force_step" => Kind::ForceStep { at: rig.reach.low + stroke * shape.uniform(0.4, 0.6) },
             _ => return None,
         };
         Some(Self { kind, magnitude })
@@ -124,8 +132,8 @@ impl Outside {
             }
     }
 
-    /// What it adds to the torque at the table; x in load units.
-    pub fn torque(&self, t: f64, x: f64) -> f64 {
+    /// What it adds to the torque at the table; x and v in load units and load units/s.
+    pub fn torque(&self, t: f64, x: f64, v: f64) -> f64 {
         self.magnitude
             * match &self.kind {
                 Kind::WanderingTorque { step, values } => {
@@ -137,6 +145,8 @@ impl Outside {
                 Kind::SweepingVibration { f0, f1, time } => {
                     (std::f64::consts::TAU * (f0 * t + 0.5 * (f1 - f0) * t * t / time)).sin()
                 }
+                Kind::CubicDrag { speed } => (v / speed).powi(3),
+                Kind::ForceStep { at } => 0.5f64.copysign(x - at),
                 Kind::Detent { centre, width } => {
                     // The slope of a potential well: pulls towards the centre from both sides.
                     let u = (x - centre) / width;

@@ -145,7 +145,7 @@ impl Truth {
             torque += self.drag * v * v.abs();
         }
         if let Some(o) = &self.outside {
-            torque += o.torque(t, x);
+            torque += o.torque(t, x, w * self.unit);
         }
         torque
     }
