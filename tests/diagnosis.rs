@@ -129,6 +129,80 @@ fn a_bump_of_friction_at_one_speed_is_no_sum_of_frictions() {
     assert!(d.unexplained.describes.contains("velocity"), "{}", d.unexplained.describes);
 }
 
+/// There and back at 100 mm/s, where rows are 400 steps of the scale's grid apart and a little more: its error beats every
+/// 20 mm. What is finer than either grid is no runout, however well it repeats; what is there is found.
+#[test]
+fn grids_that_beat_are_no_error_of_the_screw() {
+    let (grid, finer) = (2.5e-4, 5e-5);
+    let speed = 1e3 * 400.005 * grid;
+    let recording = |period: f64, swing: f64| {
+        let mut noise = noise(17);
+        let mut columns = [Vec::new(), Vec::new(), Vec::new(), Vec::new()];
+        // 1.5 s one way, 0.4 s to turn, and the same back.
+        let way = |i: u32| match i % 3800 {
+            i @ ..1500 => (1.0, f64::from(u8::from(i == 0)) * 0.5),
+            i @ ..1900 => (1.0 - f64::from(i - 1500) / 200.0, if i == 1500 { -0.5 } else { -1.0 }),
+            i @ ..3400 => (-1.0, f64::from(u8::from(i == 1900)) * -0.5),
+            i => (f64::from(i - 3400) / 200.0 - 1.0, if i == 3400 { 0.5 } else { 1.0 }),
+        };
+        let (mut x, unit) = (0.0, TAU / 10.0);
+        for i in 0..30_000 {
+            let (v, a) = (speed * way(i).0, speed / 0.2 * way(i).1);
+            let table = x + swing * (TAU * x / period).sin();
+            columns[0].push(1e-3 * f64::from(i));
+            columns[1].push((x / finer).round() * finer);
+            columns[2].push((table / grid).round() * grid);
+            columns[3].push(0.003 * a * unit + 0.008 * v * unit + 0.9 * sign(v) + 0.1 + 0.03 * noise());
+            x += 0.5e-3 * (v + speed * way(i + 1).0);
+        }
+        let [time, x, table, torque] = columns;
+        let columns = [("x.position_mm", x), ("x.table_position_mm", table), ("x.torque_nm", torque)];
+        let columns = columns.map(|(name, values)| Column::new(name, values)).into();
+        Recording::from_columns("grids", time, columns).unwrap()
+    };
+    let d = judged(&recording(20.0, 0.0));
+    assert_eq!((d.verdict, d.findings.len()), (Verdict::NoDiscrepancy, 0), "{:?}", d.findings);
+    let d = judged(&recording(10.0, 3e-4));
+    let found = d.findings.first().map(|f| f.effect.values()).unwrap_or_default();
+    assert!(
+        d.findings.len() == 1 && (found[0] - 0.3).abs() < 0.015 && (found[1] - 10.0).abs() < 0.01,
+        "{:?}",
+        d.findings
+    );
+}
+
+fn sign(v: f64) -> f64 {
+    if v == 0.0 { 0.0 } else { v.signum() }
+}
+
+/// Rows that are not used are told, with their number, the first of them, and what to do; so is a column that holds nothing.
+#[test]
+fn rows_that_are_not_used_are_told() {
+    let whole = recording(|_, _, v, _| 0.3 * v.signum());
+    let with = |change: fn(&mut Vec<f64>, &mut Vec<f64>, &mut Vec<f64>)| {
+        let (mut time, mut x) = (whole.time_s.clone(), whole.columns[0].values.clone());
+        let mut torque = whole.columns[1].values.clone();
+        change(&mut time, &mut x, &mut torque);
+        let columns = vec![Column::new("x.position_mm", x), Column::new("x.torque_nm", torque)];
+        judged(&Recording::from_columns("rows", time, columns).unwrap())
+    };
+    let told = |d: &Diagnosis, words: &[&str]| d.notes.iter().any(|n| words.iter().all(|word| n.contains(word)));
+    let d = with(|_, _, torque| torque[700..703].fill(f64::NAN));
+    assert!(told(&d, &["x.torque_nm", "3 times", "row 702", "left out"]), "{:?}", d.notes);
+    assert!(d.verdict == Verdict::Explained && d.to_json().to_string().contains("row 702"));
+    let d = with(|time, _, _| time[9000..].iter_mut().for_each(|t| *t += 0.5));
+    assert!(told(&d, &["rows are missing", "row 9002"]), "{:?}", d.notes);
+    let d = with(|time, _, _| time[500] = time[499]);
+    assert!(told(&d, &["repeats", "row 502"]), "{:?}", d.notes);
+    let d = with(|_, _, torque| torque.fill(0.0));
+    assert!(d.verdict == Verdict::InsufficientData && d.missing[0].contains("every row"), "{:?}", d.missing);
+    assert!(judged(&whole).notes.is_empty());
+    // A unit that is none of the format's is named, with those that are.
+    let columns = vec![whole.columns[0].clone(), Column::new("x.torque_kn", whole.columns[1].values.clone())];
+    let d = judged(&Recording::from_columns("unit", whole.time_s.clone(), columns).unwrap());
+    assert!(["x.torque_kn", "\"kn\"", "nm"].iter().all(|word| d.missing[0].contains(word)), "{:?}", d.missing);
+}
+
 #[test]
 fn a_law_without_a_name_is_not_imitated_by_several_that_have_one() {
     /// Torque of time, position, speed and acceleration.

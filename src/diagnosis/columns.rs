@@ -4,7 +4,7 @@ use super::frame::Columns;
 use crate::analysis::statistics;
 use crate::machine::Axis;
 use crate::plant::observed::Observed;
-use crate::recording::{Column, Recording, RecordingError, Signal, Unit};
+use crate::recording::{Column, IssueKind, Recording, RecordingError, Signal, Unit};
 use std::ops::Range;
 
 /// Most rows that are worked on; of longer recordings, evenly spread stretches.
@@ -101,13 +101,15 @@ impl Columns {
         Ok(out)
     }
 
-    /// What a reader must know of the rows that are not among these.
-    pub(super) fn note(&self) -> Vec<String> {
+    /// What a reader must know of the rows of a recording that are not among these, or not as they were recorded.
+    pub(super) fn notes(&self, recording: &Recording, axis: &Axis) -> Vec<String> {
         let (used, all) = (self.time_s.len(), self.time_s.len() + self.left_out);
         let text = || {
             format!("{all} rows are more than are worked on: {used} of them were, in {PIECES} evenly spread stretches")
         };
-        if self.left_out > 0 { vec![text()] } else { Vec::new() }
+        let mut notes: Vec<String> = if self.left_out > 0 { vec![text()] } else { Vec::new() };
+        notes.extend(amiss(recording, axis));
+        notes
     }
 
     /// The same columns as the simulation sees a recording; `None` where no stretch is long enough for a motion.
@@ -149,6 +151,29 @@ impl Columns {
             ..self
         }
     }
+}
+
+/// What is amiss with the rows of an axis's columns, what became of them, and what to do.
+fn amiss<'r>(recording: &'r Recording, axis: &'r Axis) -> impl Iterator<Item = String> + 'r {
+    let read = |name: &str| {
+        let label = recording.columns.iter().find(|c| c.name == name).and_then(|c| c.label.as_ref());
+        use Signal::{Force, Position, PositionCommand, TablePosition, Torque};
+        let signals = [Position, PositionCommand, TablePosition, Torque, Force];
+        name == "time_s" || label.is_some_and(|l| l.channel == axis.name && signals.contains(&l.signal))
+    };
+    let concerned = recording.issues.iter().filter(move |issue| issue.column.as_deref().is_none_or(read));
+    concerned.filter_map(|issue| {
+        let what_to_do = match issue.kind {
+            IssueKind::RepeatedTime => "write times with more decimals",
+            IssueKind::Gap => "what lies between gaps is judged; record every row if much is missing",
+            IssueKind::IrregularSampling => "rows are interpolated to even steps; record one a servo cycle",
+            IssueKind::NotFinite => "the rows around them are judged; record again if they are many",
+            IssueKind::Jump | IssueKind::Outlier => "look at encoder and cable if it happens again",
+            IssueKind::Wrap => "nothing need be done",
+            IssueKind::WrongUnit | IssueKind::UnknownColumn => return None,
+        };
+        Some(format!("{issue}: {what_to_do}"))
+    })
 }
 
 /// All runs, or evenly spread pieces of them where they are too long together.

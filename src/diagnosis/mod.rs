@@ -19,6 +19,7 @@ pub mod fit;
 mod foreign;
 pub mod frame;
 pub mod gain;
+mod grids;
 mod json;
 mod judge;
 mod known;

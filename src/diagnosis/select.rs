@@ -10,6 +10,7 @@ use super::blocks;
 use super::causes::Law;
 use super::causes::periods::{FEW, is_in_each_period};
 use super::fit::{Bench, Fit, Part, figure};
+use super::grids;
 use super::progress::{Stopped, Watch};
 use super::uncertainty;
 use crate::machine::Cause;
@@ -312,7 +313,10 @@ fn shrink(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
         };
         let needed = price(&without[weakest]) - price(&fit) >= LEAST_GAIN && borne_out(bench, &without[weakest], &fit);
         let dropped = if needed {
-            slight(bench, &without, &fit).or_else(|| doubtful(bench, &without, &fit)).or_else(|| once_only(bench, &fit))
+            slight(bench, &without, &fit)
+                .or_else(|| doubtful(bench, &without, &fit))
+                .or_else(|| once_only(bench, &fit))
+                .or_else(|| grids::imitated(bench, &without, &fit))
         } else {
             Some(weakest)
         };

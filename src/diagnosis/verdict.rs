@@ -103,7 +103,7 @@ pub fn diagnose(
         Ok(columns) => columns,
         Err(why) => return Ok(insufficient(axis, vec![why.to_string()])),
     };
-    let notes = whole.note();
+    let notes = whole.notes(recording, axis);
     if let Err(why) = axis.two_masses() {
         return Ok(insufficient(axis, vec![format!("a machine file that holds together: {why}")]));
     }
@@ -112,7 +112,7 @@ pub fn diagnose(
     let frame = Frame::new(&base, &columns, None);
     let missing = what_is_missing(&frame);
     if !missing.is_empty() {
-        return Ok(insufficient(axis, missing));
+        return Ok(Diagnosis { notes, ..insufficient(axis, missing) });
     }
     watch.at(0.05, "reading the motion")?;
     let recorded = Recorded { axis, whole: &whole, holdout, watch: &watch };
@@ -157,9 +157,9 @@ fn answer(recorded: &Recorded, frame: &Frame, mut notes: Vec<String>) -> Result<
     let mut findings = findings(axis, &bench, &judged.selection, &empty);
     let mut extended = extended_by(axis, &findings);
     if let Some(holdout) = holdout {
-        match Columns::of(holdout, axis).map(|columns| (columns.note(), columns.observed())) {
+        match Columns::of(holdout, axis).map(|columns| (columns.notes(holdout, axis), columns.observed())) {
             Ok((note, Some(observed))) => {
-                notes.extend(note);
+                notes.extend(note.iter().map(|note| format!("hold-out: {note}")));
                 judged.gains = gain::on_holdout(axis, &extended, &observed, watch)?;
                 if refuted(&judged.gains) {
                     let causes = findings.iter().map(|f| f.effect.cause());
@@ -227,10 +227,20 @@ fn insufficient(axis: &Axis, missing: Vec<String>) -> Diagnosis {
 
 fn what_is_missing(frame: &Frame) -> Vec<String> {
     let mut missing = Vec::new();
-    if frame.kept.len() < LEAST_ROWS || frame.judged_seconds() < LEAST_SECONDS {
+    let (word, torque) = (frame.axis.drive.torque_word(), &frame.columns.torque);
+    if let Some(first) = torque.first().filter(|first| torque.iter().all(|value| value == *first)) {
+        missing.push(format!("{word}: the column is {first} in every row, as if nothing was connected; record what the drive says the motor delivers"));
+        return missing;
+    }
+    let (rows, seconds) = (frame.kept.len(), frame.judged_seconds());
+    if rows < LEAST_ROWS || seconds < LEAST_SECONDS {
+        let (found, needed) = if seconds < LEAST_SECONDS {
+            (format!("{seconds:.2} s"), format!("{LEAST_SECONDS} s"))
+        } else {
+            (format!("{rows} rows that are independent through the filter"), LEAST_ROWS.to_string())
+        };
         missing.push(format!(
-            "motion: only {:.2} s of the recording are steady enough sliding to be judged, {LEAST_SECONDS} s are needed; record several moves there and back",
-            frame.judged_seconds()
+            "motion: only {found} of the recording are steady enough sliding to be judged, {needed} are needed; record several moves there and back"
         ));
         return missing;
     }

@@ -163,8 +163,27 @@ impl Recording {
     /// Names the missing column, the units it may come in, and the columns that are there.
     pub fn column(&self, channel: &str, signal: Signal) -> Result<&Column, RecordingError> {
         self.get(channel, signal).ok_or_else(|| {
+            let unit = |column: &'_ Column| match Name::parse(&column.name) {
+                Name::WrongUnit { signal: found, unit } if found == signal => {
+                    column.name.starts_with(&format!("{channel}.")).then_some((column.name.clone(), unit))
+                }
+                _ => None,
+            };
             let units: Vec<&str> = signal.units().iter().map(|unit| unit.suffix()).collect();
             let wanted = format!("{channel}.{}_{}", signal.name(), units.first().copied().unwrap_or_default());
+            if let Some((name, unit)) = self.columns.iter().find_map(unit) {
+                let found = if unit.is_empty() {
+                    "no unit".to_owned()
+                } else {
+                    format!("the unit {unit:?}, which is not known")
+                };
+                let message = format!(
+                    "has {found}; {} comes in {}: convert the values and call the column {wanted}",
+                    signal.name(),
+                    units.join(", ")
+                );
+                return RecordingError::new(&self.file, message).at_row(1).in_column(&name);
+            }
             let have: Vec<&str> = self.columns.iter().map(|column| column.name.as_str()).collect();
             let also = if units.len() > 1 { format!(" (or in {})", units[1..].join(", ")) } else { String::new() };
             RecordingError::new(

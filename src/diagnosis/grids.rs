@@ -1,0 +1,170 @@
+//! What the grids of encoder and scale make of themselves.
+//!
+//! A reading on a grid g is off by e(x) = Σ g/(π·k)·sin(2π·k·x/g), k = 1, 2, …, and its offset is anybody's. Rows taken at one
+//! speed meet that sawtooth at nearly the same place of each step: it beats, and what is far finer than a row seems to repeat
+//! every some millimetres, or to grow along the stroke. How much of it falls on a trace c is the trace's sum over the rows as
+//! they were passed, |Σ c·e^(2πi·k·x/g)|: little where they fall evenly on the grid, all of g/π where they beat with the trace.
+//! Noise σ on the reading takes e^(−2π²·k²·σ²/g²) off it (Widrow and Kollár 2008).
+
+use super::fit::{Bench, Fit};
+use super::frame::Columns;
+use super::many::{add, dot, sines_and_cosines};
+use crate::analysis::statistics;
+use crate::machine::Cause;
+use std::f64::consts::PI;
+
+/// Terms of the sawtooth.
+const TERMS: usize = 3;
+/// How much larger than what the grids make a cause must be. Places on the grid are known to a fifth of a step or so, which
+/// takes up to half off the sums.
+const SURELY: f64 = 2.0;
+
+/// A part in table − encoder that may well be the grids'; `without` are the fits without each part.
+#[must_use]
+pub fn imitated(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
+    let screw = |i: &usize| [Cause::ScrewPitchError, Cause::ScrewPeriodicError].contains(&fit.parts[*i].law.cause);
+    (0..fit.parts.len()).filter(screw).find(|&i| {
+        let less = &without[i];
+        let sawtooth = sawtooth(bench, less);
+        let own = cleared(fit.columns(i), less.basis());
+        let squares = |values: &[f64]| own.iter().map(|c| dot(c, values).powi(2)).sum::<f64>();
+        // Whatever the offset of the grid, its waves are no larger than sine and cosine together.
+        let made: f64 = sawtooth.iter().map(|[sine, cosine]| (squares(sine) + squares(cosine)).sqrt()).sum();
+        squares(&less.residual).sqrt() < SURELY * made || is_within_a_step(bench, fit, i)
+    })
+}
+
+/// Whether a pitch error does not come to a step over the whole stroke: neither sensor has seen it.
+fn is_within_a_step(bench: &Bench, fit: &Fit, part: usize) -> bool {
+    let (low, high) = bench.frame.stroke();
+    let along = |scale_um_m: &f64| 1e-6 * scale_um_m.abs() * (high - low);
+    let steps = sensors(bench).map_or(0.0, |both| both.iter().map(|s| 0.5 * s.grid * s.left_of_term(1.0)).sum());
+    fit.parts[part].law.cause == Cause::ScrewPitchError && fit.coefficients[part].first().map(along) < Some(steps)
+}
+
+/// Sine and cosine of each term of the sawtooths of encoder and scale, as large as they are, stacked and scaled, if a fit is
+/// right.
+fn sawtooth(bench: &Bench, fit: &Fit) -> Vec<[Vec<f64>; 2]> {
+    let (frame, columns) = (bench.frame, bench.frame.columns);
+    let (Some(readings), Some([encoder, scale])) = (&columns.table, sensors(bench)) else { return Vec::new() };
+    let many = rows_in_one(columns);
+    // A reading holds its own error, and seems to stand on its grid wherever the axis is: the place is told by the other
+    // sensor, unless that is the coarser one by far.
+    let (seen, apart) = (frame.low_pass.run(readings, &columns.stretches), table_beyond_encoder(bench, fit));
+    let moved = |place: &[f64], way: f64| -> Vec<f64> { place.iter().zip(&apart).map(|(x, d)| x + way * d).collect() };
+    let of_encoder = if scale.grid < 1.5 * encoder.grid { moved(&seen, -1.0) } else { frame.x.clone() };
+    let of_scale = if encoder.grid < 1.5 * scale.grid { moved(&frame.x, 1.0) } else { seen };
+    let stack = |values: Vec<f64>| -> Vec<f64> {
+        let filtered = frame.low_passed(&values).into_iter().map(|v| v / bench.floors[1]);
+        std::iter::repeat_n(0.0, bench.rows).chain(filtered).collect()
+    };
+    let mut out = Vec::new();
+    for (sensor, place) in [(encoder, of_encoder), (scale, of_scale)] {
+        for k in (1..=TERMS).map(|k| k as f64).take_while(|_| sensor.grid > 0.0) {
+            let size = sensor.grid / (PI * k) * sensor.left_of_term(k);
+            let mut waves = [vec![0.0; place.len()], vec![0.0; place.len()]];
+            for part in 0..many as usize {
+                let after = columns.period_s * ((part as f64 + 0.5) / many - 0.5);
+                let turns = place.iter().zip(&frame.v).map(|(x, v)| k * (x + v * after) / sensor.grid);
+                let (sines, cosines) = sines_and_cosines(&turns.collect::<Vec<f64>>());
+                add(&mut waves[0], size / many, &sines);
+                add(&mut waves[1], size / many, &cosines);
+            }
+            out.push(waves.map(stack));
+        }
+    }
+    out
+}
+
+/// Encoder and scale.
+fn sensors(bench: &Bench) -> Option<[Sensor; 2]> {
+    let (columns, many) = (bench.frame.columns, rows_in_one(bench.frame.columns));
+    Some([&columns.position, columns.table.as_ref()?].map(|readings| Sensor::of(readings, many)))
+}
+
+/// Of how many rows one is the mean; its error is that of their errors.
+fn rows_in_one(columns: &Columns) -> f64 {
+    (columns.period_s / columns.recorded_period_s).round().max(1.0)
+}
+
+/// A position sensor.
+struct Sensor {
+    /// Its grid, load units; 0 where it shows none.
+    grid: f64,
+    /// Noise over its steps.
+    scatter: f64,
+}
+
+impl Sensor {
+    /// By its readings, each the mean of so many: they lie on as many parts of the grid, with so much less noise.
+    fn of(readings: &[f64], many: f64) -> Self {
+        let grid = many * statistics::grid(readings).map_or(0.0, |grid| sharpened(grid, readings));
+        // What the grid itself makes is no noise on it. From row to row that may swing to and fro, and look like more: noise looks
+        // alike at every spacing.
+        let at_spacing = |rows: usize| -> Option<f64> {
+            statistics::white_noise(&readings.iter().copied().step_by(rows).collect::<Vec<f64>>())
+        };
+        let least = (1..=4).filter_map(at_spacing).fold(f64::INFINITY, f64::min);
+        let noise = many.sqrt() * if least.is_finite() { least } else { 0.0 };
+        let scatter = (noise * noise - grid * grid / 12.0).max(0.0).sqrt();
+        Self { grid, scatter: if grid > 0.0 { scatter / grid } else { 0.0 } }
+    }
+
+    /// What noise leaves of a term of the sawtooth.
+    fn left_of_term(&self, k: f64) -> f64 {
+        (-2.0 * (PI * k * self.scatter).powi(2)).exp()
+    }
+}
+
+/// How far a fit has the table beyond the encoder at every row, load units.
+fn table_beyond_encoder(bench: &Bench, fit: &Fit) -> Vec<f64> {
+    let (kept, mut apart) = (&bench.frame.kept, vec![0.0; bench.frame.x.len()]);
+    for part in 0..fit.parts.len() {
+        let traced = &fit.contribution(part)[bench.rows..];
+        for (rows, ends) in kept.windows(2).zip(traced.windows(2)) {
+            let slope = (ends[1] - ends[0]) / (rows[1] - rows[0]) as f64;
+            for (i, apart) in apart[rows[0]..rows[1]].iter_mut().enumerate() {
+                *apart += bench.floors[1] * (ends[0] + slope * i as f64);
+            }
+        }
+    }
+    apart
+}
+
+/// A grid to the digits that count the steps over the whole stroke: by how many of them readings are apart, over farther and
+/// farther readings.
+fn sharpened(mut grid: f64, readings: &[f64]) -> f64 {
+    let Some(&first) = readings.first() else { return grid };
+    let farthest = readings.iter().fold(0.0f64, |far, x| far.max((x - first).abs()));
+    let mut reach = 100.0 * grid;
+    while reach < 10.0 * farthest {
+        let near = readings.iter().map(|x| x - first).filter(|x| x.abs() < reach);
+        let (with, own) = near.fold((0.0, 0.0), |(with, own), x| {
+            let steps = (x / grid).round();
+            (with + x * steps, own + steps * steps)
+        });
+        if own > 0.0 {
+            grid = with / own;
+        }
+        reach *= 10.0;
+    }
+    grid
+}
+
+/// Columns at right angles to a basis and each other, of unit length; those that the basis spans are left out.
+fn cleared(columns: &[Vec<f64>], basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let mut own: Vec<Vec<f64>> = Vec::new();
+    for column in columns {
+        let mut c = column.clone();
+        for direction in basis.iter().chain(&own) {
+            let along = dot(direction, &c);
+            add(&mut c, -along, direction);
+        }
+        let length = dot(&c, &c).sqrt();
+        if length > 1e-6 * dot(column, column).sqrt() {
+            c.iter_mut().for_each(|c| *c /= length);
+            own.push(c);
+        }
+    }
+    own
+}
