@@ -14,6 +14,7 @@ use super::*;
 use crate::diagnosis::many::widest;
 use crate::diagnosis::sampling::NUMEROV;
 use crate::machine::TwoMasses;
+use std::cell::RefCell;
 use std::ops::Range;
 
 /// The traces in the torque (against the rigid axis) and in table − encoder, of each effect.
@@ -43,6 +44,12 @@ const LANES: usize = 8;
 const STEP_RAD: [f64; 2] = [0.12, 0.35];
 
 type Lanes = [f64; LANES];
+
+thread_local! {
+    /// Torque and table − motor of every row, kept for the next simulation: handed back and asked for again each time, the
+    /// memory would take as long as the simulation.
+    static ROOM: RefCell<[Vec<Lanes>; 2]> = const { RefCell::new([Vec::new(), Vec::new()]) };
+}
 
 #[inline(always)]
 fn lanes(value: impl Fn(usize) -> f64) -> Lanes {
@@ -113,20 +120,24 @@ impl<'a> Tables<'a> {
     /// The traces of the first `count` tables: torque beyond that of the rigid axis, each row the mean under a triangle over one
     /// row to either side, and table − motor in load units.
     fn terms(&self, count: usize) -> Vec<Term> {
-        let rows = self.frame.x.len();
-        let with_table = self.frame.columns.table.is_some();
-        let mut extra = vec![[0.0; LANES]; rows];
-        let mut lag = vec![[0.0; LANES]; if with_table { rows } else { 0 }];
-        for s in &self.frame.columns.stretches {
-            widest(
-                #[inline(always)]
-                || self.stretch(s.clone(), &mut extra, &mut lag),
-            );
-        }
-        let torques = self.frame.low_passed_together(&extra);
-        let tables = if with_table { self.frame.low_passed_together(&lag) } else { Default::default() };
-        let term = |(torque, table)| Term { fixed: Some(Trace { torque, table }), regressors: Vec::new() };
-        torques.into_iter().zip(tables).take(count).map(term).collect()
+        ROOM.with_borrow_mut(|[extra, lag]| {
+            let rows = self.frame.x.len();
+            let lags = if self.frame.columns.table.is_some() { rows } else { 0 };
+            for (column, rows) in [(&mut *extra, rows), (&mut *lag, lags)] {
+                column.clear();
+                column.resize(rows, [0.0; LANES]);
+            }
+            for s in &self.frame.columns.stretches {
+                widest(
+                    #[inline(always)]
+                    || self.stretch(s.clone(), extra, lag),
+                );
+            }
+            let torques = self.frame.low_passed_together(extra);
+            let tables = if lags > 0 { self.frame.low_passed_together(lag) } else { Default::default() };
+            let term = |(torque, table)| Term { fixed: Some(Trace { torque, table }), regressors: Vec::new() };
+            torques.into_iter().zip(tables).take(count).map(term).collect()
+        })
     }
 
     /// Torque that the link of a rigid axis carries at a row.
