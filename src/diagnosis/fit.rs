@@ -206,9 +206,19 @@ impl<'f, 'a> Bench<'f, 'a> {
         channel_squares(&residual, self.rows)
     }
 
-    /// Refines the non-linear parameters of the parts from index `first` on.
+    /// Refines the non-linear parameters of the parts from index `first` on, until a step brings nothing.
     #[must_use]
-    pub fn refine(&self, mut fit: Fit, first: usize, most: usize) -> Fit {
+    pub fn refine(&self, fit: Fit, first: usize, most: usize) -> Fit {
+        self.refine_while(fit, first, most, 1e-5)
+    }
+
+    /// The same until a step takes less than a thousandth off the squares: enough to compare sets of causes.
+    #[must_use]
+    pub fn refine_roughly(&self, fit: Fit, first: usize, most: usize) -> Fit {
+        self.refine_while(fit, first, most, 1e-3)
+    }
+
+    fn refine_while(&self, mut fit: Fit, first: usize, most: usize, least: f64) -> Fit {
         for _ in 0..most {
             let slopes = self.slopes(&fit, first);
             if slopes.is_empty() {
@@ -243,7 +253,7 @@ impl<'f, 'a> Bench<'f, 'a> {
             let Some(next) = better else { break };
             let gained = 1.0 - next.squares() / before;
             fit = next;
-            if gained < 1e-5 {
+            if gained < least {
                 break;
             }
         }

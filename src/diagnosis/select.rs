@@ -223,8 +223,8 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
         let mut parts = set.parts.clone();
         parts.push(part.clone());
         let count = set.parts.len();
-        let fit = bench.refine(bench.fit(parts), count, 6);
-        let fit = bench.refine(fit, 0, if count == 0 { 4 } else { 2 });
+        let fit = bench.refine_roughly(bench.fit(parts), count, 6);
+        let fit = bench.refine_roughly(fit, 0, if count == 0 { 4 } else { 2 });
         (is_physical(bench, &fit) && once_only(bench, &fit).is_none() && price(&fit) < price(set) - 0.5 * LEAST_GAIN)
             .then_some(fit)
     })?;
