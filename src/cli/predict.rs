@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use gib::machine::Axis;
+use gib::plant::added::Added;
 use gib::plant::closed_loop::predict;
 use gib::plant::observed::Observed;
 use gib::recording::{Recording, Signal};
@@ -67,6 +68,7 @@ struct Predicted<'a> {
     torque: Vec<f64>,
     phases_unknown: usize,
     position: Option<Vec<f64>>,
+    added: Option<Added>,
 }
 
 impl<'a> Predicted<'a> {
@@ -75,7 +77,7 @@ impl<'a> Predicted<'a> {
         let prediction = predict(axis, &observed)?;
         let position = prediction.closed_loop.map(|replayed| replayed.position);
         let (torque, phases_unknown) = (prediction.torque.torque, prediction.torque.phases_unknown);
-        Ok(Self { axis, observed, torque, phases_unknown, position })
+        Ok(Self { axis, observed, torque, phases_unknown, position, added: prediction.added })
     }
 
     fn residual(&self) -> impl Iterator<Item = f64> {
@@ -91,6 +93,7 @@ impl<'a> Predicted<'a> {
             residual: rms(self.residual()),
             moving: rms(moving.map(|(residual, _)| residual)),
             position_um: self.position.as_ref().map(|p| 1e3 * rms(p.iter().zip(measured).map(|(p, m)| m - p))),
+            added: self.added.as_ref().map_or((0, 0.0), |added| (added.pulses, added.largest)),
             cutoff_hz: self.observed.motion.cutoff_hz,
         }
     }
@@ -102,13 +105,16 @@ struct Figures {
     residual: f64,
     moving: f64,
     position_um: Option<f64>,
+    /// Pulses of torque that were added to the servo's, and the largest.
+    added: (usize, f64),
     cutoff_hz: f64,
 }
 
 impl Figures {
     fn json(&self) -> Value {
         json!({ "torque_rms": self.torque, "residual_torque_rms": self.residual, "residual_torque_rms_moving": self.moving,
-            "residual_position_rms_um": self.position_um, "motion_cutoff_hz": self.cutoff_hz })
+            "residual_position_rms_um": self.position_um, "added_torque_pulses": self.added.0,
+            "added_torque_largest": self.added.1, "motion_cutoff_hz": self.cutoff_hz })
     }
 
     fn text(&self, predicted: &Predicted<'_>, text: &mut String) {
@@ -124,6 +130,13 @@ impl Figures {
             }
             Some(um) => _ = writeln!(text, "  position not predicted       {um:10.4} µm RMS, closed loop"),
             None => text.push_str("  position not predicted: needs a servo block and a position_command column\n"),
+        }
+        if let (pulses @ 1.., largest) = self.added {
+            let _ = writeln!(
+                text,
+                "  {pulses} pulses of {word}, the largest {largest:.4} {unit}, are in the recording beyond what the servo's law makes of \
+                 it;\n  the closed loop was given them"
+            );
         }
         let _ = writeln!(text, "  speed and acceleration up to {cutoff_hz:10.1} Hz, where motion meets noise");
         let ripples = predicted

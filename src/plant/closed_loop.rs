@@ -1,7 +1,9 @@
 //! The closed loop replayed: the recorded command through servo and model, at ideal sensors.
 //!
-//! Starts in the state that the recording shows in its first row; after that nothing measured enters.
+//! Starts in the state that the recording shows in its first row; after that nothing measured enters but the command, and the
+//! torque that was added to the servo's, where there was such.
 
+use super::added::{Added, added};
 use super::motion::cubic_at;
 use super::noise::Noise;
 use super::observed::Observed;
@@ -27,6 +29,8 @@ pub struct Prediction {
     pub torque: TorquePrediction,
     /// The closed loop; `None` without a servo or a recorded command.
     pub closed_loop: Option<ClosedLoop>,
+    /// What was added to the servo's torque; the closed loop has it too.
+    pub added: Option<Added>,
 }
 
 /// Predicts a recording: what `gib predict` writes and what the gain of a diagnosis is measured by.
@@ -35,20 +39,30 @@ pub struct Prediction {
 /// As [`predict_torque`] and [`replay`].
 pub fn predict(axis: &Axis, observed: &Observed) -> Result<Prediction, String> {
     let mut torque = predict_torque(axis, observed)?;
-    let closed_loop = replay(axis, observed, &torque)?;
+    let mut closed_loop = replay(axis, observed, &torque, &[])?;
     if let Some(replayed) = &closed_loop {
         fill_rest(&mut torque, observed, replayed);
     }
-    Ok(Prediction { torque, closed_loop })
+    let added = added(axis, observed);
+    if let Some(added) = &added {
+        closed_loop = replay(axis, observed, &torque, &added.torque)?;
+    }
+    Ok(Prediction { torque, closed_loop, added })
 }
 
-/// Simulates the recorded command under the axis's servo; `prediction` gives the numbers and the phases of its ripples.
+/// Simulates the recorded command under the axis's servo; `prediction` gives the numbers and the phases of its ripples, `added`
+/// what is added to the servo's torque in each cycle (empty for nothing).
 ///
 /// `None` where the axis has no servo or the recording no command.
 ///
 /// # Errors
 /// The simulation's, or a servo period that does not suit the recording.
-pub fn replay(axis: &Axis, observed: &Observed, prediction: &TorquePrediction) -> Result<Option<ClosedLoop>, String> {
+fn replay(
+    axis: &Axis,
+    observed: &Observed,
+    prediction: &TorquePrediction,
+    added: &[f64],
+) -> Result<Option<ClosedLoop>, String> {
     let (Some(servo), Some(command)) = (&axis.servo, &observed.command) else { return Ok(None) };
     let time = &observed.time_s;
     let (Some(&begin), Some(&end)) = (time.first(), time.last()) else { return Ok(None) };
@@ -68,7 +82,7 @@ pub fn replay(axis: &Axis, observed: &Observed, prediction: &TorquePrediction) -
     let torque = at_start(&prediction.torque).unwrap_or(0.0);
     let start = Start { position, velocity, torque };
     let setup = Setup { start: Some(start), ..Setup::default() };
-    let trace = simulate_physics(axis, prediction.physics.clone(), &command, &setup, Noise::new(0))?;
+    let trace = simulate_physics(axis, prediction.physics.clone(), &command, added, &setup, Noise::new(0))?;
     // The rows of a recording made once a servo cycle are the cycles themselves.
     let rows = |values: Vec<f64>| {
         let place = |t: &f64| {

@@ -1,5 +1,6 @@
 //! Simulation: what an axis does, and what its motion says its motor must deliver.
 
+pub mod added;
 pub mod axis;
 pub mod closed_loop;
 mod coupling;

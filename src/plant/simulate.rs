@@ -85,10 +85,10 @@ pub fn simulate(axis: &Axis, command: &[f64], setup: &Setup) -> Result<Trace, St
     let mut noise = Noise::new(setup.seed);
     let ripples = physics.cogging.iter_mut().chain(&mut physics.vibration).chain(&mut physics.table_error);
     ripples.for_each(|ripple| ripple.phase = TAU * noise.uniform());
-    simulate_physics(axis, physics, command, setup, noise)
+    simulate_physics(axis, physics, command, &[], setup, noise)
 }
 
-/// The same with phases given.
+/// The same with phases given, and with torque that is added to the servo's in each cycle (empty for none).
 ///
 /// # Errors
 /// As [`simulate`].
@@ -96,6 +96,7 @@ pub fn simulate_physics(
     axis: &Axis,
     physics: Physics,
     command: &[f64],
+    added: &[f64],
     setup: &Setup,
     mut noise: Noise,
 ) -> Result<Trace, String> {
@@ -130,7 +131,9 @@ pub fn simulate_physics(
         trace.position.push(read);
         trace.table_position.push(encoder.digitise(table.table_of(table_motor / scale), &mut noise));
         let speed = speed_of(command, cycle) / servo.period_s;
-        let asked = control.cycle(target * scale, speed * scale, read * scale);
+        let own = control.cycle(target * scale, speed * scale, read * scale);
+        let limit = axis.base.torque_limit;
+        let asked = added.get(cycle).map_or(own, |added| (own + added).clamp(-limit, limit));
         torques.push((asked, body.torque()));
         body.advance(asked, fine);
         if late > 0 {
@@ -147,7 +150,7 @@ pub fn simulate_physics(
 }
 
 /// Travel per cycle of a command at a cycle: that of its neighbours, at the ends that of the one neighbour.
-fn speed_of(command: &[f64], cycle: usize) -> f64 {
+pub(super) fn speed_of(command: &[f64], cycle: usize) -> f64 {
     let (before, after) = (cycle.saturating_sub(1), (cycle + 1).min(command.len() - 1));
     if after == before { 0.0 } else { (command[after] - command[before]) / (after - before) as f64 }
 }

@@ -1,0 +1,169 @@
+//! Torque that somebody adds to the servo's own: a closed loop is to repeat the recording, pulses and all, and noise is no pulse.
+//!
+//! The recordings come from an axis of the test's own: Runge-Kutta of fourth order, friction as a steep curve, another servo.
+
+#[path = "support/random.rs"]
+mod random;
+
+use gib::machine::{Axis, Machine};
+use gib::plant::added::added;
+use gib::plant::closed_loop::predict;
+use gib::plant::observed::Observed;
+use random::Random;
+
+const BELIEVED: &str = r#"{ "schema": "gib.machine/1", "name": "t", "axes": [ { "name": "x", "drive": "linear",
+    "mass_kg": 95.0, "coulomb_friction_n": 20.0, "viscous_friction_n_s_m": 200.0, "force_limit_n": 400.0,
+    "servo": { "period_s": 0.001, "position_gain_1_s": 120.0, "velocity_gain_n_s_m": 8000.0, INTEGRAL
+               "torque_time_constant_s": LAG } } ] }"#;
+
+const ROWS: usize = 9000;
+const PULSES: usize = 10;
+
+/// What happens to one recording.
+#[derive(Clone, Copy)]
+struct Case {
+    /// Size of the pulses, N.
+    pulse: f64,
+    /// Whether the force column holds them.
+    seen: bool,
+    integral_s: f64,
+    lag_s: f64,
+    /// Noise of the force column, N.
+    noise: f64,
+    /// Rows by which the force column is early.
+    early: usize,
+    /// The true servo's speed gain over the believed one.
+    gain: f64,
+}
+
+const PLAIN: Case = Case { pulse: 60.0, seen: true, integral_s: 0.0, lag_s: 0.0, noise: 0.3, early: 0, gain: 1.0 };
+
+fn believed(case: &Case) -> Axis {
+    let integral = match case.integral_s {
+        0.0 => String::new(),
+        time => format!("\"velocity_integral_time_s\": {time},"),
+    };
+    Machine::parse(&BELIEVED.replace("INTEGRAL", &integral).replace("LAG", &case.lag_s.to_string()))
+        .unwrap()
+        .axes
+        .remove(0)
+}
+
+/// Strokes of 80 mm under the servo, a pulse of 25 ms now and then while the axis moves: at rest the steep curve would creep where
+/// dry friction holds.
+fn recorded(case: &Case, seed: u64) -> Observed {
+    let mut random = Random(seed);
+    let (period, parts) = (1e-3, 20);
+    let h = period / f64::from(parts);
+    let command = |row: usize| 0.04 - 0.04 * (1.7 * row as f64 * period).cos();
+    let begins: Vec<(usize, f64)> = (0..PULSES)
+        .map(|k| {
+            let sign = if random.next() < 0.5 { -1.0 } else { 1.0 };
+            (300 + k * ROWS / PULSES + (random.next() * 200.0) as usize, sign * random.between(0.6, 1.0) * case.pulse)
+        })
+        .collect();
+    let acceleration = |v: f64, force: f64| (force - 200.0 * v - 20.0 * (v / 2e-4).tanh()) / 95.0;
+    let (mut x, mut v, mut sum, mut last) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0);
+    // The servo's own force and the pulse's, at the motor.
+    let mut force = [0.0_f64; 2];
+    let (mut position, mut column) = (Vec::new(), Vec::new());
+    for row in 0..ROWS {
+        let read = (x / 5e-8).round() * 5e-8;
+        let pulse: f64 =
+            begins.iter().filter(|(begin, _)| (*begin..begin + 25).contains(&row)).map(|(_, size)| size).sum();
+        let error = 120.0 * (command(row) - read) - (read - last) / period;
+        let own = case.gain * 8000.0 * (error + sum);
+        sum += if case.integral_s > 0.0 { error * period / case.integral_s } else { 0.0 };
+        last = read;
+        let asked = [own, pulse];
+        position.push(1e3 * read);
+        column.push(if case.seen { force[0] + force[1] } else { force[0] } + case.noise * random.normal());
+        for _ in 0..parts {
+            // The lag leaves so much of a difference after a part of a cycle, and so much in its mean.
+            let (rest, mean) = match case.lag_s {
+                0.0 => (0.0, 0.0),
+                lag => ((-h / lag).exp(), lag / h * -(-h / lag).exp_m1()),
+            };
+            let push: f64 = (0..2).map(|i| asked[i] + (force[i] - asked[i]) * mean).sum();
+            force = std::array::from_fn(|i| asked[i] + (force[i] - asked[i]) * rest);
+            let k1 = acceleration(v, push);
+            let k2 = acceleration(v + 0.5 * h * k1, push);
+            let k3 = acceleration(v + 0.5 * h * k2, push);
+            let k4 = acceleration(v + h * k3, push);
+            x += h * (v + h / 6.0 * (k1 + k2 + k3));
+            v += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+        }
+    }
+    column.rotate_left(case.early);
+    let time = (0..ROWS).map(|row| row as f64 * period).collect();
+    let command = (0..ROWS).map(|row| 1e3 * command(row)).collect();
+    Observed::from_columns(time, position, column, Some(command), None, vec![0..ROWS]).unwrap()
+}
+
+/// RMS of the closed loop's error, µm.
+fn position_error(axis: &Axis, observed: &Observed) -> f64 {
+    let replayed = predict(axis, observed).unwrap().closed_loop.unwrap().position;
+    let square: f64 = replayed.iter().zip(&observed.position).map(|(a, b)| (1e3 * (a - b)).powi(2)).sum();
+    (square / ROWS as f64).sqrt()
+}
+
+/// Whatever servo: with and without integral, with and without lag, noisy and not, the column early by a row.
+#[test]
+fn pulses_are_found_and_the_closed_loop_repeats_them() {
+    let cases = [
+        PLAIN,
+        Case { noise: 0.0, ..PLAIN },
+        Case { noise: 3.0, ..PLAIN },
+        Case { early: 1, ..PLAIN },
+        Case { integral_s: 0.03, ..PLAIN },
+        Case { lag_s: 0.0007, noise: 1.0, ..PLAIN },
+        Case { integral_s: 0.03, lag_s: 0.002, ..PLAIN },
+    ];
+    for (k, case) in cases.iter().enumerate() {
+        for seed in 0..4 {
+            let (axis, observed) = (believed(case), recorded(case, seed));
+            let found = added(&axis, &observed).unwrap();
+            let quiet = position_error(&axis, &recorded(&Case { pulse: 0.0, ..*case }, seed));
+            let repeated = position_error(&axis, &observed);
+            println!(
+                "case {k}, seed {seed}: {} pulses, {:.2} N; {quiet:.3}, {repeated:.3} µm",
+                found.pulses, found.largest
+            );
+            // The error of a clean recording, and what the column's noise within the pulses moves.
+            assert!(repeated < 1.5 * quiet + 0.05 + 0.03 * case.noise, "case {k}, seed {seed}: {quiet} {repeated}");
+            let size = found.largest;
+            assert!(size < 60.0 + 4.0 * case.noise + 0.01 && size > 50.0, "case {k}, seed {seed}: {size} N");
+            // A tail of a lag may fall in two when noise hides a row of it.
+            assert!(found.pulses >= PULSES && found.pulses < 2 * PULSES, "case {k}, seed {seed}: {}", found.pulses);
+        }
+    }
+}
+
+/// No pulse, one that the drive does not see, and a servo that is not the machine file's: nothing is added.
+#[test]
+fn neither_noise_nor_a_wrong_servo_nor_an_outside_force_is_added_torque() {
+    let cases = [
+        Case { pulse: 0.0, ..PLAIN },
+        Case { pulse: 0.0, noise: 5.0, ..PLAIN },
+        Case { pulse: 0.0, integral_s: 0.03, lag_s: 0.0007, ..PLAIN },
+        Case { seen: false, ..PLAIN },
+        Case { gain: 1.15, ..PLAIN },
+        Case { gain: 1.15, pulse: 0.0, noise: 0.01, ..PLAIN },
+    ];
+    for (k, case) in cases.iter().enumerate() {
+        for seed in 0..4 {
+            let found = added(&believed(case), &recorded(case, seed));
+            assert!(found.is_none(), "case {k}, seed {seed}: {} pulses", found.unwrap().pulses);
+        }
+    }
+}
+
+/// The predicted torque never knows the measured one, pulses or not.
+#[test]
+fn the_predicted_torque_does_not_use_the_torque_column() {
+    let (axis, observed) = (believed(&PLAIN), recorded(&PLAIN, 1));
+    let other =
+        Observed { torque: observed.torque.iter().map(|force| 0.5 * force.cos()).collect(), ..observed.clone() };
+    let torque = |observed| predict(&axis, observed).unwrap().torque.torque;
+    assert_eq!(torque(&observed), torque(&other));
+}
