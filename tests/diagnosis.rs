@@ -97,17 +97,6 @@ fn each_law_is_found_under_its_own_name() {
 }
 
 #[test]
-fn a_cable_that_pulls_nothing_somewhere_is_a_cable_alone() {
-    // Beside a wrong inertia and a wrong level of friction, that all of the belief is opened for it.
-    let extra = |_: f64, x: f64, v: f64, a: f64| 0.004 * (x - 45.0) + 0.3 * v.signum() + 0.0012 * a * TAU / 10.0;
-    let d = judged(&recording(extra));
-    let cable = d.findings.iter().find(|f| f.effect.cause() == Cause::CableForce).map(|f| f.effect.values());
-    let zero = cable.expect("a cable").get(1).copied().unwrap_or_default();
-    assert!((zero - 45.0).abs() < 2.0, "{zero}");
-    assert!(d.findings.iter().all(|f| f.effect.cause() != Cause::ConstantTorque), "{:?}", d.findings);
-}
-
-#[test]
 fn two_at_once_are_both_found() {
     let d = judged(&recording(|_, x, v, _| 0.1 * v.signum() + 0.06 * (TAU * x / 2.5).sin()));
     let mut named: Vec<Cause> = d.findings.iter().map(|f| f.effect.cause()).collect();

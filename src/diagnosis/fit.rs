@@ -382,7 +382,7 @@ pub fn pseudo_inverse(matrix: DMatrix<f64>, least: f64) -> Option<DMatrix<f64>> 
 
 /// The part of a column that stands on the basis, with unit length, and its weights on basis and itself. A column that
 /// the basis already spans gives a zero column.
-fn orthonormal(column: &[f64], basis: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn orthonormal(column: &[f64], basis: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
     let mut c = column.to_vec();
     let mut weights = vec![0.0; basis.len() + 1];
     for _ in 0..2 {

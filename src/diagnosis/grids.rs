@@ -6,7 +6,7 @@
 //! they were passed, |Σ c·e^(2πi·k·x/g)|: little where they fall evenly on the grid, all of g/π where they beat with the trace.
 //! Noise σ on the reading takes e^(−2π²·k²·σ²/g²) off it (Widrow and Kollár 2008).
 
-use super::fit::{Bench, Fit};
+use super::fit::{Bench, Fit, orthonormal};
 use super::frame::Columns;
 use super::many::{add, dot, sines_and_cosines};
 use crate::analysis::statistics;
@@ -153,18 +153,12 @@ fn sharpened(mut grid: f64, readings: &[f64]) -> f64 {
 
 /// Columns at right angles to a basis and each other, of unit length; those that the basis spans are left out.
 fn cleared(columns: &[Vec<f64>], basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let mut own: Vec<Vec<f64>> = Vec::new();
+    let mut all = basis.to_vec();
     for column in columns {
-        let mut c = column.clone();
-        for direction in basis.iter().chain(&own) {
-            let along = dot(direction, &c);
-            add(&mut c, -along, direction);
-        }
-        let length = dot(&c, &c).sqrt();
-        if length > 1e-6 * dot(column, column).sqrt() {
-            c.iter_mut().for_each(|c| *c /= length);
-            own.push(c);
+        let (own, weights) = orthonormal(column, &all);
+        if weights[all.len()] > 0.0 {
+            all.push(own);
         }
     }
-    own
+    all.split_off(basis.len())
 }

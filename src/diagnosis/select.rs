@@ -153,7 +153,7 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     // What only several numbers of the belief together explain, others may have imitated one by one.
     let open = idle_left_out(search.bench, search.with_beliefs(&start), search.watch)?;
     let start = if price(&open) < price(&start) { open } else { start };
-    let fit = shrink(search.bench, with_its_own_zero(search.bench, start), search.watch)?;
+    let fit = shrink(search.bench, start, search.watch)?;
     rivals.retain(|r| r.parts.len() == fit.parts.len() && !same_causes(r, &fit));
     Ok(Selection { fit, rivals })
 }
@@ -296,18 +296,6 @@ pub fn idle_left_out(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, 
             None => return Ok(fit),
         }
     }
-}
-
-/// A cable that pulls nothing at zero, and a constant torque, are a cable that pulls nothing elsewhere: the same line, and one
-/// cause fewer.
-fn with_its_own_zero(bench: &Bench, fit: Fit) -> Fit {
-    let of = |cause| fit.parts.iter().position(|part| part.law.cause == cause);
-    let (Some(cable), Some(constant)) = (of(Cause::CableForce), of(Cause::ConstantTorque)) else { return fit };
-    let mut parts = fit.parts.clone();
-    parts[cable] = bench.parts(parts[cable].law, vec![vec![1.0]]).swap_remove(0);
-    parts.remove(constant);
-    let merged = bench.fit(parts);
-    if is_physical(bench, &merged) { merged } else { fit }
 }
 
 /// Drops causes that the others can do without, and those that held-out blocks do not bear out.
