@@ -132,7 +132,7 @@ static void many_short_ramps(void **state)
 }
 
 /* A weakened field and saturation are found by themselves, since every second ramp is gentler; a saturation that is told is left
-   out. Of 520 of each none, none and one were wrong. */
+   out. Of 560 of each none, one and one were wrong. */
 static void what_lies_beyond_base_speed_and_saturation_is_left_out(void **state)
 {
     (void)state;
