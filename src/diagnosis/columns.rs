@@ -3,6 +3,7 @@
 use super::frame::Columns;
 use crate::analysis::statistics;
 use crate::machine::Axis;
+use crate::plant::motion::{are_even, times_of_rows};
 use crate::plant::observed::Observed;
 use crate::recording::{Column, IssueKind, Recording, RecordingError, Signal, Unit};
 use std::ops::Range;
@@ -74,8 +75,8 @@ impl Columns {
         };
         for run in runs {
             let start = out.time_s.len();
-            let times = &recording.time_s[run.clone()];
-            let even = if recording.sampling.regular { None } else { Some(even_times(times, period_s)) };
+            let times = &*times_of_rows(&recording.time_s[run.clone()], &position.values[run.clone()]);
+            let even = if are_even(times, 0.02) { None } else { Some(even_times(times, period_s)) };
             let take = |to: &mut Vec<f64>, from: &Source| {
                 let values = &from.values[run.clone()];
                 match &even {
@@ -166,7 +167,7 @@ fn amiss<'r>(recording: &'r Recording, axis: &'r Axis) -> impl Iterator<Item = S
         let what_to_do = match issue.kind {
             IssueKind::RepeatedTime => "write times with more decimals",
             IssueKind::Gap => "what lies between gaps is judged; record every row if much is missing",
-            IssueKind::IrregularSampling => "rows are interpolated to even steps; record one a servo cycle",
+            IssueKind::IrregularSampling => "rows are taken as even where the motion is smoother so, else interpolated to even steps; record one a servo cycle",
             IssueKind::NotFinite => "the rows around them are judged; record again if they are many",
             IssueKind::Jump | IssueKind::Outlier => "look at encoder and cable if it happens again",
             IssueKind::Wrap => "nothing need be done",

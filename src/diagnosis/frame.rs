@@ -8,6 +8,7 @@
 //! taken off before any dead time is looked for.
 
 use super::filter::{LowPass, convolve, norm, of_three};
+use super::grids;
 use super::many::{decay, product, widest};
 use super::rows::{direction_of, doubtful_rows, judged_rows, resting_rows};
 use super::sampling::{NUMEROV, Sampling};
@@ -93,6 +94,8 @@ pub struct Frame<'a> {
     /// Filtered torque of every row, not aligned.
     torque: Vec<f64>,
     stroke: (f64, f64),
+    /// What the encoder's grid makes in the balance beyond what [`Frame::floor`] sees in second differences, drive's own unit.
+    unseen: f64,
     /// Weights of the whole filter of what is smooth between rows, of the measured torque, and of the low-pass alone; odd.
     kernel: Vec<f64>,
     instant_kernel: Vec<f64>,
@@ -156,7 +159,7 @@ impl<'a> Frame<'a> {
         let blocks = (0..=BLOCKS).map(|b| b * kept.len() / BLOCKS).collect();
         let acceleration = kept.iter().map(|&i| a[i] * unit).collect();
         let speed = kept.iter().map(|&i| v[i] * unit).collect();
-        Self {
+        let mut frame = Self {
             axis,
             belief,
             columns,
@@ -178,11 +181,14 @@ impl<'a> Frame<'a> {
             speed,
             torque,
             stroke: columns.position.iter().fold((f64::MAX, f64::MIN), |(lo, hi), x| (x.min(lo), x.max(hi))),
+            unseen: 0.0,
             kernel,
             instant_kernel,
             torque_kernel,
             low_pass_kernel,
-        }
+        };
+        frame.unseen = grids::unseen_by_floor(&frame);
+        frame
     }
 
     /// The same recording with the torque column taken to be later by `late_s`, by whatever way its rows were sampled.
@@ -299,8 +305,8 @@ impl<'a> Frame<'a> {
     }
 
     /// Noise floor of a filtered column at the judged rows, in its unit: what white noise through the filter would be,
-    /// judged by second differences, in which slow structure is gone. `averaged` says that
-    /// the column went through the three-point mean as well, as torque does.
+    /// judged by second differences, in which slow structure is gone, and what the encoder's grid makes beyond that. `averaged`
+    /// says that the column is torque, which went through the three-point mean as well.
     #[must_use]
     pub fn floor(&self, values: &[f64], averaged: bool) -> f64 {
         let stride = self.kept.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(1);
@@ -321,7 +327,7 @@ impl<'a> Frame<'a> {
         let estimates = [1, 2, 3, 5, 8].into_iter().filter_map(at_spacing).filter(|e| *e > 0.0);
         let noise = estimates.fold(f64::INFINITY, f64::min).clamp(1e-12, 1e12);
         if averaged {
-            return noise;
+            return noise.hypot(self.unseen);
         }
         // The grids of two position sensors do not average out where the axis creeps.
         let grid = self.columns.table.as_ref().and_then(|t| crate::analysis::statistics::grid(t)).unwrap_or(0.0);

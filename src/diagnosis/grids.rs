@@ -6,8 +6,9 @@
 //! they were passed, |Σ c·e^(2πi·k·x/g)|: little where they fall evenly on the grid, all of g/π where they beat with the trace.
 //! Noise σ on the reading takes e^(−2π²·k²·σ²/g²) off it (Widrow and Kollár 2008).
 
+use super::filter::LowPass;
 use super::fit::{Bench, Fit, orthonormal};
-use super::frame::Columns;
+use super::frame::{Columns, Frame};
 use super::many::{add, dot, sines_and_cosines};
 use crate::analysis::statistics;
 use crate::machine::Cause;
@@ -15,9 +16,45 @@ use std::f64::consts::PI;
 
 /// Terms of the sawtooth.
 const TERMS: usize = 3;
+/// Over how many widths of the filter a place on the grid is smoothed; odd.
+const WIDE: usize = 9;
 /// How much larger than what the grids make a cause must be. Places on the grid are known to a fifth of a step or so, which
 /// takes up to half off the sums.
 const SURELY: f64 = 2.0;
+
+/// What the encoder's grid makes in the torque balance through the inertia, RMS over the judged rows, drive's own unit, beyond
+/// what the second differences of a noise floor see of it: a speed at which rows meet the grid at nearly the same place makes a
+/// tone below the filter, and looks like a torque.
+#[must_use]
+pub fn unseen_by_floor(frame: &Frame) -> f64 {
+    let columns = frame.columns;
+    let many = rows_in_one(columns);
+    let encoder = Sensor::of(&columns.position, many);
+    if encoder.grid <= 0.0 {
+        return 0.0;
+    }
+    // Smoothed over many steps of the grid, so that the place does not hold the error that is asked for.
+    let place = LowPass { width: WIDE * frame.low_pass.width }.run(&columns.position, &columns.stretches);
+    let slope = |i: usize| match place.get(i.wrapping_sub(1)..i + 2) {
+        Some(&[before, _, after]) => 0.5 * (after - before),
+        _ => 0.0,
+    };
+    let size = encoder.grid / many * encoder.left_of_term(1.0);
+    let error_of = |i: usize| -> f64 {
+        let turns = |part: usize| (place[i] + slope(i) * ((part as f64 + 0.5) / many - 0.5)) / encoder.grid;
+        (0..many as usize).map(turns).map(|turns| size * (turns - turns.round())).sum()
+    };
+    let error: Vec<f64> = (0..place.len()).map(error_of).collect();
+    let per = frame.belief.inertia * frame.unit / columns.period_s.powi(2);
+    let bend = |i: usize| match error.get(i.wrapping_sub(1)..i + 2) {
+        Some(&[before, at, after]) => per * (after - 2.0 * at + before),
+        _ => 0.0,
+    };
+    let mut made = frame.low_passed(&(0..error.len()).map(bend).collect::<Vec<_>>());
+    made.iter_mut().zip(&frame.weights).for_each(|(made, weight)| *made *= weight);
+    let square = dot(&made, &made) / made.len().max(1) as f64;
+    (square - frame.floor(&made, true).powi(2)).max(0.0).sqrt()
+}
 
 /// A part in table − encoder that may well be the grids'; `without` are the fits without each part.
 #[must_use]

@@ -1,14 +1,15 @@
 //! One axis of a recording in the units of the model, with its motion worked out once.
 
-use super::motion::{FEWEST_ROWS, Motion};
+use super::motion::{FEWEST_ROWS, Motion, times_of_rows};
 use crate::machine::Axis;
 use crate::recording::{Recording, RecordingError, Signal, Unit};
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// What a recording shows of one axis. All columns have one value a row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observed {
-    /// As recorded, s.
+    /// When the rows were taken, s: as recorded, or evenly where the motion says so ([`times_of_rows`]).
     pub time_s: Vec<f64>,
     /// Mean time between rows, s.
     pub period_s: f64,
@@ -68,7 +69,7 @@ impl Observed {
     /// The same from columns in the units of the model; `None` when no run is long enough.
     #[must_use]
     pub fn from_columns(
-        time_s: Vec<f64>,
+        mut time_s: Vec<f64>,
         position: Vec<f64>,
         torque: Vec<f64>,
         command: Option<Vec<f64>>,
@@ -76,6 +77,11 @@ impl Observed {
         mut runs: Vec<Range<usize>>,
     ) -> Option<Observed> {
         runs.retain(|run| run.len() >= FEWEST_ROWS && run.end <= position.len());
+        for run in &runs {
+            if let Cow::Owned(even) = times_of_rows(&time_s[run.clone()], &position[run.clone()]) {
+                time_s[run.clone()].copy_from_slice(&even);
+            }
+        }
         let longest = runs.iter().max_by_key(|run| run.len())?.clone();
         let period_s = (time_s[longest.end - 1] - time_s[longest.start]) / (longest.len() - 1) as f64;
         let motion = Motion::of_stretches(&time_s, &position, &runs)?;
