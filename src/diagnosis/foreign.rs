@@ -19,6 +19,8 @@ const FOR_AS_MANY: f64 = LEAST_GAIN;
 /// halved.
 const PLACES: usize = 24;
 const HALVED: i32 = 5;
+/// Pieces of the time or of the stroke, each with a level of its own.
+const PIECES: usize = 48;
 
 /// What is said while it is done.
 const STAGE: &str = "comparing with laws without a name";
@@ -36,7 +38,7 @@ struct Foreign {
     regressors: fn(&Frame, f64) -> Vec<Vec<f64>>,
 }
 
-static LAWS: [Foreign; 7] = [
+static LAWS: [Foreign; 10] = [
     Foreign {
         goes: "with the cube of speed",
         numbers: 1,
@@ -51,9 +53,18 @@ static LAWS: [Foreign; 7] = [
     },
     Foreign {
         goes: "as a friction that grows with the load",
-        numbers: 1,
+        numbers: 2,
         somewhere: false,
-        regressors: |frame, _| vec![frame.judged_by(|i| frame.direction[i] * load(frame, i).abs())],
+        // c·|T| of friction in T itself: a motor that drives needs 1/(1 − c) of the load, one that brakes 1/(1 + c).
+        regressors: |frame, _| {
+            let where_it = |drives: bool| {
+                frame.judged_by(|i| {
+                    let load = load(frame, i);
+                    if (load * frame.direction[i] > 0.0) == drives { load } else { 0.0 }
+                })
+            };
+            vec![where_it(true), where_it(false)]
+        },
     },
     Foreign {
         goes: "as a step along the stroke",
@@ -66,6 +77,29 @@ static LAWS: [Foreign; 7] = [
         numbers: 3,
         somewhere: true,
         regressors: |frame, share| on_either_side(frame, share, |i| frame.direction[i]),
+    },
+    Foreign {
+        goes: "as a torque that wanders in time",
+        numbers: PIECES,
+        somewhere: false,
+        regressors: |frame, _| by_pieces(frame, |i| frame.seconds(i), |_| 1.0),
+    },
+    Foreign {
+        goes: "as a friction that wanders in time",
+        numbers: PIECES,
+        somewhere: false,
+        regressors: |frame, _| by_pieces(frame, |i| frame.seconds(i), |i| frame.direction[i]),
+    },
+    Foreign {
+        goes: "along the stroke, one way there and another way back",
+        numbers: 2 * PIECES,
+        somewhere: false,
+        regressors: |frame, _| {
+            let one_way = |way: f64| {
+                by_pieces(frame, |i| frame.x[i], move |i| if frame.direction[i] * way > 0.0 { 1.0 } else { 0.0 })
+            };
+            [one_way(1.0), one_way(-1.0)].concat()
+        },
     },
     Foreign {
         goes: "as a friction that is another about one speed",
@@ -144,6 +178,15 @@ fn on_either_side(frame: &Frame, share: f64, of: impl Fn(usize) -> f64) -> Vec<V
     let (low, high) = frame.stroke();
     let place = low + share * (high - low);
     [false, true].map(|beyond| frame.judged_by(|i| if (frame.x[i] > place) == beyond { of(i) } else { 0.0 })).into()
+}
+
+/// What a function of the row is in each piece of the way that another one goes.
+fn by_pieces(frame: &Frame, along: impl Fn(usize) -> f64, of: impl Fn(usize) -> f64) -> Vec<Vec<f64>> {
+    let at: Vec<f64> = (0..frame.x.len()).map(along).collect();
+    let (low, high) = at.iter().fold((f64::MAX, f64::MIN), |(low, high), a| (a.min(low), a.max(high)));
+    let per = PIECES as f64 / (high - low).max(1e-300);
+    let piece: Vec<usize> = at.iter().map(|a| (((a - low) * per) as usize).min(PIECES - 1)).collect();
+    (0..PIECES).map(|wanted| frame.judged_by(|i| if piece[i] == wanted { of(i) } else { 0.0 })).collect()
 }
 
 /// Friction about one speed, over so many of the ways between two places.

@@ -130,7 +130,11 @@ pub fn times_of_rows<'t>(time_s: &'t [f64], position: &[f64]) -> Cow<'t, [f64]> 
 /// How far the middle one of five rows is from the cubic through the others.
 fn beside_cubic(t: [f64; 5], x: &[f64]) -> f64 {
     let weight = |k: usize| -> f64 {
-        [0, 1, 3, 4].into_iter().filter(|&other| other != k).map(|other| (t[2] - t[other]) / (t[k] - t[other])).product()
+        [0, 1, 3, 4]
+            .into_iter()
+            .filter(|&other| other != k)
+            .map(|other| (t[2] - t[other]) / (t[k] - t[other]))
+            .product()
     };
     x[2] - [0, 1, 3, 4].into_iter().map(|k| weight(k) * x[k]).sum::<f64>()
 }
