@@ -137,7 +137,9 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
     let mut near: Vec<(f64, &'static Foreign, f64)> =
         watch.each(&laws, (0.9, 0.91), STAGE, first_place)?.into_iter().flatten().collect();
     near.retain(|(share, ..)| *share > LEAST);
-    near.sort_by(|a, b| b.0.total_cmp(&a.0));
+    // Levels of many pieces take any form: a law of few numbers that does is what is there.
+    let many = |law: &Foreign| law.numbers >= PIECES;
+    near.sort_by(|a, b| many(a.1).cmp(&many(b.1)).then(b.0.total_cmp(&a.0)));
     for (_, law, place) in near {
         let beside = |place: f64| {
             let with = bench.beside((law.regressors)(bench.frame, place).into_iter().map(Trace::torque));
