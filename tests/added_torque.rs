@@ -26,6 +26,8 @@ struct Case {
     pulse: f64,
     /// Whether the force column holds them.
     seen: bool,
+    /// Whether the axis feels them.
+    felt: bool,
     integral_s: f64,
     lag_s: f64,
     /// Noise of the force column, N.
@@ -36,7 +38,8 @@ struct Case {
     gain: f64,
 }
 
-const PLAIN: Case = Case { pulse: 60.0, seen: true, integral_s: 0.0, lag_s: 0.0, noise: 0.3, early: 0, gain: 1.0 };
+const PLAIN: Case =
+    Case { pulse: 60.0, seen: true, felt: true, integral_s: 0.0, lag_s: 0.0, noise: 0.3, early: 0, gain: 1.0 };
 
 fn believed(case: &Case) -> Axis {
     let integral = match case.integral_s {
@@ -84,7 +87,8 @@ fn recorded(case: &Case, seed: u64) -> Observed {
                 0.0 => (0.0, 0.0),
                 lag => ((-h / lag).exp(), lag / h * -(-h / lag).exp_m1()),
             };
-            let push: f64 = (0..2).map(|i| asked[i] + (force[i] - asked[i]) * mean).sum();
+            let felt = if case.felt { 2 } else { 1 };
+            let push: f64 = (0..felt).map(|i| asked[i] + (force[i] - asked[i]) * mean).sum();
             force = std::array::from_fn(|i| asked[i] + (force[i] - asked[i]) * rest);
             let k1 = acceleration(v, push);
             let k2 = acceleration(v + 0.5 * h * k1, push);
@@ -155,6 +159,16 @@ fn neither_noise_nor_a_wrong_servo_nor_an_outside_force_is_added_torque() {
             let found = added(&believed(case), &recorded(case, seed));
             assert!(found.is_none(), "case {k}, seed {seed}: {} pulses", found.unwrap().pulses);
         }
+    }
+}
+
+/// Pulses that the torque sensor makes alone: the closed loop is better off without them.
+#[test]
+fn what_the_axis_does_not_feel_is_not_added() {
+    let case = Case { felt: false, ..PLAIN };
+    for seed in 0..4 {
+        let (axis, observed) = (believed(&case), recorded(&case, seed));
+        assert!(added(&axis, &observed).is_some() && predict(&axis, &observed).unwrap().added.is_none(), "seed {seed}");
     }
 }
 

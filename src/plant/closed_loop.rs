@@ -43,11 +43,20 @@ pub fn predict(axis: &Axis, observed: &Observed) -> Result<Prediction, String> {
     if let Some(replayed) = &closed_loop {
         fill_rest(&mut torque, observed, replayed);
     }
-    let added = added(axis, observed);
-    if let Some(added) = &added {
-        closed_loop = replay(axis, observed, &torque, &added.torque)?;
+    let mut added = added(axis, observed);
+    if let Some(torques) = &added {
+        let with = replay(axis, observed, &torque, &torques.torque)?;
+        // What only the torque sensor saw, the axis did not feel.
+        let felt = error_of(observed, with.as_ref()) < error_of(observed, closed_loop.as_ref());
+        if felt { closed_loop = with } else { added = None }
     }
     Ok(Prediction { torque, closed_loop, added })
+}
+
+/// Sum of the squared errors of the replayed position.
+fn error_of(observed: &Observed, replayed: Option<&ClosedLoop>) -> f64 {
+    let rows = replayed.into_iter().flat_map(|replayed| replayed.position.iter().zip(&observed.position));
+    rows.map(|(replayed, measured)| (replayed - measured).powi(2)).filter(|square| square.is_finite()).sum()
 }
 
 /// Simulates the recorded command under the axis's servo; `prediction` gives the numbers and the phases of its ripples, `added`
