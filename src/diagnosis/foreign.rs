@@ -133,12 +133,12 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
         let tried = places.map(|place| place as f64 / PLACES as f64).map(|place| (alike(law, place), *law, place));
         tried.max_by(|a, b| a.0.total_cmp(&b.0))
     };
-    let laws: Vec<&'static Foreign> = LAWS.iter().collect();
+    // Levels of many pieces take any form: a law of few numbers that does is what is there, and so is one cause.
+    let many = |law: &Foreign| law.numbers >= PIECES;
+    let laws: Vec<&'static Foreign> = LAWS.iter().filter(|law| found.parts.len() > 1 || !many(law)).collect();
     let mut near: Vec<(f64, &'static Foreign, f64)> =
         watch.each(&laws, (0.9, 0.91), STAGE, first_place)?.into_iter().flatten().collect();
     near.retain(|(share, ..)| *share > LEAST);
-    // Levels of many pieces take any form: a law of few numbers that does is what is there.
-    let many = |law: &Foreign| law.numbers >= PIECES;
     near.sort_by(|a, b| many(a.1).cmp(&many(b.1)).then(b.0.total_cmp(&a.0)));
     for (_, law, place) in near {
         let beside = |place: f64| {
@@ -162,7 +162,7 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
         // What the causes that are still needed explain by themselves.
         let own = bench.fit(left.parts).squares() - found.squares();
         let least = if needless > 1 { 0.0 } else { FOR_AS_MANY };
-        if needless > 0 && better > least && own > MOST * explained {
+        if needless > usize::from(many(law)) && better > least && own > MOST * explained {
             return Ok(Some(law.goes));
         }
     }
