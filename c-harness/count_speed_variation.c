@@ -48,10 +48,24 @@ static int count(int waveform, const char *label)
     for (int i = 0; i < 4000; i++) {
         labelled_step(gib, &in, label);
     }
-    in.period_s = 1.5;
-    labelled_step(gib, &in, "change");
+    /* A change now and then, each worked out over the cycles after it; then one in every cycle, as an override on its ramp. */
+    for (int i = 0; i < 40; i++) {
+        in.speed_rpm = 1000.0 - 0.5 * i;
+        in.period_s = 1.0 + 0.1 * (i % 7);
+        in.cutting_nm = 20.0 + (i % 3);
+        for (int k = 0; k < 7; k++) {
+            labelled_step(gib, &in, "change");
+        }
+        for (int k = 0; k < 50; k++) {
+            labelled_step(gib, &in, "seldom");
+        }
+    }
+    for (int i = 0; i < 1000; i++) {
+        in.speed_rpm += i < 500 ? 0.5 : -0.5;
+        labelled_step(gib, &in, "every cycle");
+    }
     in.flags = GIB_SPEED_VARIATION_STOP;
-    labelled_step(gib, &in, "change");
+    labelled_step(gib, &in, "stop");
     in.flags = 0;
     int32_t status;
     do {

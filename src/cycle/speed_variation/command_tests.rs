@@ -2,7 +2,7 @@
 
 use super::config::*;
 use super::io::*;
-use super::machine::SpeedVariation;
+use super::machine::{SpeedVariation, WORKED_OUT};
 use super::plan::Plan;
 use crate::cycle::backlash::io::GIB_INPUT_ABORT;
 use crate::error::*;
@@ -30,6 +30,55 @@ fn started(config: &SpeedVariationConfig) -> SpeedVariation {
     let mut machine = SpeedVariation::default();
     machine.start(Plan::to_start(config)).unwrap();
     machine
+}
+
+/// Asks for as long as it takes to work out what is asked for.
+fn worked_out(machine: &mut SpeedVariation, input: &SpeedVariationInput) {
+    for _ in 0..WORKED_OUT {
+        machine.step(input);
+    }
+}
+
+/// A change is gone by within the cycles stated, also when another was being worked out; until then the old one goes on.
+#[test]
+fn a_change_goes_by_the_old_until_it_is_worked_out() {
+    for waveform in [GIB_SPEED_VARIATION_TRIANGLE, GIB_SPEED_VARIATION_SINE] {
+        let mut latest = 0;
+        for between in 0..12 {
+            let mut machine = started(&SpeedVariationConfig { waveform, ..config() });
+            for _ in 0..100 {
+                machine.step(&asked(1000.0));
+            }
+            let mut unchanged = machine;
+            for _ in 0..between {
+                let input = SpeedVariationInput { period_s: 3.0, ..asked(1000.0) };
+                let out = *machine.step(&input);
+                let old = *unchanged.step(&asked(1000.0));
+                assert!(out.speed_command_rpm == old.speed_command_rpm || out.amplitude_limit_ratio > 0.7, "{out:?}");
+            }
+            let last = SpeedVariationInput { amplitude_ratio: 0.11, ..asked(1000.0) };
+            let cycle = (1..).find(|_| machine.step(&last).amplitude_ratio == 0.11).unwrap();
+            latest = latest.max(cycle);
+        }
+        assert_eq!(latest, WORKED_OUT);
+    }
+}
+
+/// A speed that changes in every cycle, as an override on its ramp, is followed as far behind as a change takes.
+#[test]
+fn a_speed_that_never_rests_is_followed() {
+    for waveform in [GIB_SPEED_VARIATION_TRIANGLE, GIB_SPEED_VARIATION_SINE] {
+        let mut machine = started(&SpeedVariationConfig { waveform, amplitude_ratio: 0.05, ..config() });
+        let ramp = |cycle: usize| 1000.0 + 0.05 * cycle as f64;
+        let (mut low, mut high) = (f64::MAX, f64::MIN);
+        for cycle in 0..20_000 {
+            let out = *machine.step(&asked(ramp(cycle)));
+            assert_eq!((out.status, out.amplitude_ratio), (GIB_BUSY, if cycle < 3 { 0.0 } else { 0.05 }), "{cycle}");
+            let share = out.speed_command_rpm / ramp(cycle) - 1.0;
+            (low, high) = (low.min(share), high.max(share));
+        }
+        assert!(low > -0.052 && low < -0.045 && high < 0.052 && high > 0.045, "{waveform} {low} {high}");
+    }
 }
 
 #[test]
@@ -146,9 +195,9 @@ fn a_stop_ends_at_the_mean_speed_and_an_abort_likewise() {
 #[test]
 fn more_than_possible_on_the_run_is_cut_and_said() {
     let mut machine = started(&config());
-    machine.step(&asked(1000.0));
+    worked_out(&mut machine, &asked(1000.0));
     assert_eq!(machine.output().message, 0);
-    machine.step(&SpeedVariationInput { amplitude_ratio: 0.9, ..asked(1000.0) });
+    worked_out(&mut machine, &SpeedVariationInput { amplitude_ratio: 0.9, ..asked(1000.0) });
     let out = *machine.output();
     assert_eq!((out.status, out.message), (GIB_BUSY, GIB_ERR_SPEED_VARIATION_POWER));
     assert!((out.amplitude_ratio - 0.578).abs() < 1e-3 && out.amplitude_limit_ratio == out.amplitude_ratio);

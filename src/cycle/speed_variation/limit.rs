@@ -7,8 +7,8 @@
 //!  4JqS/R + Tc + Tcut + B·S(1+q)         ≤ T      linear in q
 //! ```
 //!
-//! A sine needs them nowhere in particular: its power is the product of two concave functions of the phase, so it has
-//! one maximum, which is searched for. Braking needs less than rising: friction helps.
+//! A sine needs them nowhere in particular. Where its power is largest, at sin φ = x/q, the derivative of power by φ is 0,
+//! which leaves one equation for x = (ω − S)/S, of amplitude and of period each; [`Balance`] has both.
 
 use core::f64::consts::{PI, TAU};
 
@@ -51,8 +51,6 @@ pub struct Motor {
     pub viscous: f64,
 }
 
-/// Bisections of an amplitude: to a part in 10⁹ of the first bracket.
-const BISECTIONS: u32 = 30;
 /// Golden sections of the phase: to 10⁻⁴ of a quarter turn; a maximum is flat, so its value is good to 10⁻⁸.
 const SECTIONS: u32 = 20;
 
@@ -88,7 +86,7 @@ impl Motor {
         let by_speed = (self.speeds[1] / mean - 1.0).min(1.0 - self.speeds[0] / mean);
         let (by_power, by_torque) = match wave {
             Wave::Triangle => self.triangle(mean, period),
-            Wave::Sine => self.sine(mean, period, by_speed),
+            Wave::Sine => self.sine(mean, period),
         };
         let power = (by_power, Limit::Power);
         let torque = (by_torque, Limit::Torque);
@@ -106,27 +104,10 @@ impl Motor {
         (by_power, (self.torque - self.used - self.viscous * mean) / steep)
     }
 
-    fn sine(&self, mean: f64, period: f64, most: f64) -> (f64, f64) {
-        let a = TAU * self.inertia * mean / period;
-        let by_torque = (self.torque - self.used - self.viscous * mean) / a.hypot(self.viscous * mean);
-        let power = |q: f64| {
-            highest(|cos, sin| (a * q * cos + self.used + self.viscous * mean * (1.0 + q * sin)) * (1.0 + q * sin))
-        };
-        // At φ = 0 the speed is the mean and the acceleration largest: more than that leaves is out of the question.
-        let at_mean = (self.power / mean - self.used - self.viscous * mean) / a;
-        let (mut low, mut high) = (0.0, most.min(at_mean));
-        if power(high) * mean <= self.power {
-            return (high, by_torque);
-        }
-        for _ in 0..BISECTIONS {
-            let q = 0.5 * (low + high);
-            if power(q) * mean <= self.power {
-                low = q;
-            } else {
-                high = q;
-            }
-        }
-        (low, by_torque)
+    fn sine(&self, mean: f64, period: f64) -> (f64, f64) {
+        let (balance, a) = (Balance::of(self, mean), TAU * self.inertia * mean / period);
+        let steep = (a * a + balance.viscous * balance.viscous).sqrt();
+        (balance.amplitude(a), (self.torque - balance.used - balance.viscous) / steep)
     }
 
     /// Shortest period (s) for an amplitude at a mean speed (rad/s); what stands in the way where none is long enough.
@@ -144,7 +125,13 @@ impl Motor {
         let swing = self.inertia * mean * amplitude;
         Ok(match wave {
             Wave::Triangle => 4.0 * swing / self.left(top),
-            Wave::Sine => TAU * swing * highest(|cos, sin| cos / self.left(mean * (1.0 + amplitude * sin))),
+            Wave::Sine => {
+                let balance = Balance::of(self, mean);
+                // cos φ / (T − used − viscous·(1 + q·sin φ)) is largest where its derivative by φ is 0.
+                let (level, swing_of_it) = (self.torque - balance.used - balance.viscous, amplitude * balance.viscous);
+                let by_torque = 1.0 / (level * level - swing_of_it * swing_of_it).sqrt();
+                TAU * swing * by_torque.max(balance.slope(amplitude))
+            }
         })
     }
 
@@ -205,6 +192,66 @@ impl Motor {
             amplitude *= 0.5;
         }
         (0.0, 0.0)
+    }
+}
+
+/// A motor's torques at the mean speed, N·m: what its power makes, what is used, and viscous friction. At the speed
+/// S·w, w = 1 + x, it has power/w − used − viscous·w left to accelerate with.
+struct Balance {
+    power: f64,
+    used: f64,
+    viscous: f64,
+}
+
+impl Balance {
+    fn of(motor: &Motor, mean: f64) -> Balance {
+        Balance { power: motor.power / mean, used: motor.used, viscous: motor.viscous * mean }
+    }
+
+    /// Amplitude of the sine that takes all power at its worst moment; 1 or more where any may be had.
+    ///
+    /// With acceleration a·q·cos φ the worst moment has a·tan φ = viscous + power/w², so that
+    ///
+    /// ```text
+    /// a²·x·w³/(viscous·w² + power) + used·w + viscous·w² − power = 0
+    /// ```
+    ///
+    /// which rises and bends upward with x: Newton's way from the right never passes the root.
+    fn amplitude(&self, a: f64) -> f64 {
+        const STEPS: u32 = 6;
+        let Balance { power, used, viscous } = *self;
+        let mut x = ((power - used - viscous) / (a * a / (viscous + power) + used + 2.0 * viscous)).min(1.0);
+        for _ in 0..STEPS {
+            let w = 1.0 + x;
+            let below = viscous * w * w + power;
+            let h = a * a * w / below;
+            let value = h * w * w * x + used * w + viscous * w * w - power;
+            let slope = h * (w * (4.0 * w - 3.0) - 2.0 * viscous * w * w * w * x / below) + used + 2.0 * viscous * w;
+            x = (x - value / slope).min(1.0);
+        }
+        let w = 1.0 + x;
+        let tangent = viscous + power / (w * w);
+        x * (tangent * tangent + a * a).sqrt() / tangent
+    }
+
+    /// Largest cos φ / (what power leaves at φ) of a sine of this amplitude, 1/(N·m); power leaves some at its top.
+    ///
+    /// Its moment is the one root within (0, q) of a cubic that bends upward, then downward: from the bend Newton's way never
+    /// passes it.
+    fn slope(&self, amplitude: f64) -> f64 {
+        const STEPS: u32 = 4;
+        let Balance { power, used, viscous } = *self;
+        let (level, square) = (used + viscous, amplitude * amplitude);
+        let (c2, c1) = (2.0 * (power - level) - square * viscous, power - level - 2.0 * square * viscous);
+        let c0 = -square * (power + viscous);
+        let bend = if level > 0.0 { c2 / (3.0 * level) } else { amplitude };
+        let mut x = bend.max(0.0).min(amplitude);
+        for _ in 0..STEPS {
+            x -= (((c2 - level * x) * x + c1) * x + c0) / ((2.0 * c2 - 3.0 * level * x) * x + c1);
+        }
+        let sin = (x / amplitude).clamp(0.0, 1.0);
+        let w = 1.0 + amplitude * sin;
+        (1.0 - sin * sin).sqrt() / (power / w - used - viscous * w)
     }
 }
 

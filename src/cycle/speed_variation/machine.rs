@@ -2,8 +2,9 @@
 //!
 //! A triangle runs between its two corner speeds at a constant rate; a sine is a phasor turned a little in each cycle.
 //! Either way the change of speed in a cycle is bounded by what the motor has left at that speed, so that a change of
-//! amplitude, period, speed or load may ask for more but never gets it. Cycles in which none of that can matter are
-//! granted in advance and cost little ([`quick`]).
+//! amplitude, period, speed or load may ask for more but never gets it. What a change leads to is worked out over the next
+//! cycles ([`super::setting`]); the load counts at once. Cycles in which none of that can matter are granted in advance and
+//! cost little ([`quick`]).
 
 mod quick;
 
@@ -11,20 +12,21 @@ use super::config::SpeedVariationLimits;
 use super::io::*;
 use super::limit::{Motor, Wave};
 use super::plan::{MOST_CUTTING, Plan, code};
+use super::setting::{Asked, Piece, Setting};
 use crate::cycle::backlash::io::{GIB_INPUT_ABORT, GIB_INPUT_FAULT};
 use crate::error::{
     Fault, GIB_BUSY, GIB_DONE, GIB_ERR_ABORTED, GIB_ERR_CONFIG, GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE,
     GIB_ERR_SPEED_VARIATION_NONE, GIB_ERR_STATE, GIB_OK,
 };
 use crate::units::rpm_from_rad_s;
-use core::f64::consts::TAU;
 
 /// Where the variation is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     /// Nothing is varied; ends with a start.
     Idle,
-    /// Waits for the first input, which says what is wanted; ends at once.
+    /// The first input says what is wanted, which is worked out while the speed follows its mean; ends after
+    /// [`WORKED_OUT`] cycles.
     Begin,
     /// The speed varies; ends with a stop, an abort or a fault.
     Running,
@@ -35,6 +37,9 @@ enum Phase {
     /// Ended with an error; ends with a start.
     Failed,
 }
+
+/// Cycles in which a change is worked out, at most: it may come when the work for another has just begun.
+pub const WORKED_OUT: u32 = 7;
 
 /// Two values of an input, side by side: aligned, so that a processor compares both at once.
 #[derive(Debug, Clone, Copy, Default)]
@@ -48,27 +53,23 @@ pub struct SpeedVariation {
     phase: Phase,
     /// First fault of this run.
     fault: Fault,
-    /// Values of the input that the constants below are for.
+    /// Values of the input last seen, and what they ask for.
     seen: [Pair; 2],
+    asked: Asked,
+    /// What the cycles go by, and what is being worked out to follow it.
+    now: Setting,
+    next: Setting,
+    piece: Piece,
     /// Change of speed on the way back, and the cycles left to get there.
     back: f64,
     patience: u32,
     speed: f64,
-    mean: f64,
-    /// Corner speeds and change in a cycle of a triangle.
-    corners: [f64; 2],
-    rate: f64,
+    /// Of a triangle.
     rising: bool,
-    /// Highest speeds at which the motor can rise and brake at that rate.
-    free: [f64; 2],
-    /// Phasor of a sine: cosine half a cycle ago and sine now; cosine and sine of half its turn in a cycle, and twice
-    /// that sine; its swing now, its goal and its change in a cycle.
+    /// Phasor of a sine: cosine half a cycle ago and sine now; twice the sine of half its turn in a cycle; its swing now.
     phasor: [f64; 2],
-    half: [f64; 2],
     turn: f64,
     swing: f64,
-    swing_goal: f64,
-    swing_rate: f64,
     /// Cycles left that need only the quick look, and the change in one of them: of a triangle's speed, a sine's swing.
     quiet: i32,
     steady: f64,
@@ -76,9 +77,8 @@ pub struct SpeedVariation {
     motor: Motor,
     /// Friction that helps to brake, without cutting, which may end at any moment.
     brake_help: f64,
-    /// Cycle time over inertia, and its inverse.
+    /// Cycle time over inertia.
     per_nm: f64,
-    nm_per: f64,
     /// The motor's power and torque, torque used and viscous friction, each as the change of speed in a cycle that it makes.
     in_changes: [f64; 4],
     /// N·m per change of speed in a cycle, in the sense of rotation; rpm per rad/s likewise.
@@ -93,27 +93,23 @@ impl Default for SpeedVariation {
             plan: Plan::REST,
             phase: Phase::Idle,
             fault: Fault::NONE,
-            seen: [Pair::default(); 2],
+            seen: [Pair([f64::NAN; 2]); 2],
+            asked: Setting::still(0.0).asked,
+            now: Setting::still(0.0),
+            next: Setting::still(0.0),
+            piece: Piece::Nothing,
             back: 0.0,
             patience: 0,
             speed: 0.0,
-            mean: 0.0,
-            corners: [0.0; 2],
-            rate: 0.0,
             rising: true,
-            free: [0.0; 2],
             phasor: [1.0, 0.0],
-            half: [1.0, 0.0],
             turn: 0.0,
             swing: 0.0,
-            swing_goal: 0.0,
-            swing_rate: 0.0,
             quiet: 0,
             steady: 0.0,
             motor: Plan::REST.motor,
             brake_help: 0.0,
             per_nm: 0.0,
-            nm_per: 0.0,
             in_changes: [0.0; 4],
             to_torque: 0.0,
             to_rpm: rpm_from_rad_s(1.0),
@@ -135,9 +131,10 @@ impl SpeedVariation {
         *self = SpeedVariation {
             plan,
             speed: plan.mean,
-            mean: plan.mean,
+            asked: Setting::still(plan.mean).asked,
+            now: Setting::still(plan.mean),
+            motor: plan.driving(plan.motor),
             per_nm: plan.cycle_s / plan.motor.inertia,
-            nm_per: plan.motor.inertia / plan.cycle_s,
             to_torque: plan.sense * plan.motor.inertia / plan.cycle_s,
             to_rpm: plan.sense * rpm_from_rad_s(1.0),
             output: SpeedVariationOutput { speed_command_rpm: self.output.speed_command_rpm, ..Default::default() },
@@ -158,6 +155,12 @@ impl SpeedVariation {
     #[must_use]
     pub fn busy(&self) -> bool {
         matches!(self.phase, Phase::Begin | Phase::Running | Phase::Stopping)
+    }
+
+    /// Mean speed asked for last, rad/s.
+    #[inline(always)]
+    fn mean(&self) -> f64 {
+        self.asked[0]
     }
 
     /// What the last step put out.
@@ -219,8 +222,8 @@ impl SpeedVariation {
     /// From beyond a corner that was moved it comes back at the motor's own pace.
     #[inline(always)]
     fn triangle(&mut self) -> f64 {
-        let [low, high] = self.corners;
-        let (speed, rate) = (self.speed, self.rate);
+        let [low, high] = self.now.corners;
+        let (speed, rate) = (self.speed, self.now.rate);
         if self.rising {
             let over = speed + rate - high;
             if over < 0.0 {
@@ -246,23 +249,12 @@ impl SpeedVariation {
         [cos, sin + self.turn * cos]
     }
 
-    /// Turns by another angle (rad) a cycle from now on, from the same phase.
-    fn turn_by(&mut self, angle: f64) {
-        let ([cos, sin], [half_cos, half_sin]) = (self.phasor, self.half);
-        let cos = (cos - sin * half_sin) / half_cos;
-        let length = (cos * cos + sin * sin).sqrt();
-        let (cos, sin) = if length > 0.5 { (cos / length, sin / length) } else { (1.0, 0.0) };
-        self.half = [(0.5 * angle).cos(), (0.5 * angle).sin()];
-        self.turn = 2.0 * self.half[1];
-        self.phasor = [cos * self.half[0] + sin * self.half[1], sin];
-    }
-
     /// Change toward the sine of this cycle.
     fn sine(&mut self) -> f64 {
         self.phasor = self.turned();
-        let missing = self.swing_goal - self.swing;
-        self.swing += if missing > self.swing_rate { self.swing_rate } else { missing };
-        self.mean + self.swing * self.phasor[1] - self.speed
+        let missing = self.now.swing - self.swing;
+        self.swing += if missing > self.now.swing_rate { self.now.swing_rate } else { missing };
+        self.now.asked[0] + self.swing * self.phasor[1] - self.speed
     }
 
     /// A cycle that `quick` declined: at rest, at a corner, on the way back, something changed or wrong.
@@ -270,7 +262,6 @@ impl SpeedVariation {
     pub fn turn(&mut self, input: &SpeedVariationInput) {
         self.quiet += 1;
         match self.phase {
-            Phase::Running if self.same(input) => self.advance(),
             Phase::Idle | Phase::Done | Phase::Failed => {
                 if input.speed_rpm.is_finite() {
                     self.output.speed_command_rpm = input.speed_rpm;
@@ -285,83 +276,101 @@ impl SpeedVariation {
                 }
             }
             Phase::Begin | Phase::Running => {
-                let moving = self.phase == Phase::Running;
-                match self.change(input) {
-                    Ok(()) if input.flags & GIB_SPEED_VARIATION_STOP != 0 => self.set_out(),
-                    Ok(()) if moving => self.advance(),
-                    Ok(()) => {}
-                    Err(fault) => self.leave(fault),
+                if !self.same(input) {
+                    self.take(input);
                 }
-                self.seen = pairs(input);
-                if self.phase == Phase::Stopping {
-                    self.go_back(input);
+                self.work();
+                match self.phase {
+                    Phase::Running => self.advance(),
+                    Phase::Stopping => self.go_back(input),
+                    _ => {}
                 }
             }
         }
     }
 
-    /// Takes over what this cycle's input wants, as far as the motor can.
-    fn change(&mut self, input: &SpeedVariationInput) -> Result<(), Fault> {
-        if let Some(fault) = danger(input) {
-            return Err(fault);
+    /// Takes over what this cycle's input asks for, to be worked out; or ends the variation.
+    fn take(&mut self, input: &SpeedVariationInput) {
+        self.seen = pairs(input);
+        let asked = match danger(input) {
+            Some(fault) => Err(fault),
+            None => self.plan.wanted(input.speed_rpm, input.amplitude_ratio, input.period_s, input.cutting_nm),
+        };
+        match asked {
+            Ok(asked) => self.asked = asked,
+            Err(fault) => return self.leave(fault),
         }
-        let plan = self.plan;
-        let [mean, amplitude, period, cutting] =
-            plan.wanted(input.speed_rpm, input.amplitude_ratio, input.period_s, input.cutting_nm)?;
-        let motor = plan.motor_cutting(cutting);
-        let (possible, limit) = plan.possible(&motor, mean, period);
-        let granted = amplitude.min(possible);
-        self.output.amplitude_ratio = granted;
-        self.output.amplitude_limit_ratio = possible;
-        self.output.period_limit_s = plan.shortest(&motor, mean, amplitude);
-        self.output.message = if granted < amplitude * (1.0 - 1e-9) { code(limit) } else { GIB_OK };
-        // The last trifle is the speed loop's, which follows the command with a little overshoot.
-        const FOLLOWED: f64 = 0.9955;
-        self.motor = Motor { power: FOLLOWED * motor.power, torque: FOLLOWED * motor.torque, ..motor };
-        if plan.published {
-            // The print knows no limit at the top of the swing, and is shown without one.
-            const ENDLESS: f64 = 1e30;
-            (self.motor.power, self.motor.torque) = (ENDLESS, ENDLESS);
+        if self.piece == Piece::Nothing {
+            self.begin_work();
         }
-        let Motor { power, torque, used, viscous, .. } = self.motor;
-        self.in_changes = [power, torque, used, viscous].map(|nm| nm * self.per_nm);
-        self.brake_help = motor.used + plan.motor.used;
+        self.load(self.asked[3]);
         if self.phase == Phase::Begin {
-            self.speed = mean;
-            self.output.speed_command_rpm = mean * self.to_rpm;
-            self.enter(Phase::Running);
+            self.speed = self.asked[0];
+            self.output.speed_command_rpm = self.speed * self.to_rpm;
         }
-        self.mean = mean;
-        self.corners = [mean * (1.0 - granted), mean * (1.0 + granted)];
-        self.rate = self.corner_rate().min(4.0 * granted * mean * plan.cycle_s / period);
-        self.free = [0.0, self.brake_help].map(|help| self.motor.fastest(self.rate * self.nm_per - help));
-        self.turn_by(TAU * plan.cycle_s / period);
-        self.swing_goal = granted * mean;
-        // Less is granted at once; the speed follows at the motor's own pace.
-        self.swing = self.swing.min(self.swing_goal);
-        self.swing_rate = self.swing_goal * plan.cycle_s / period;
-        Ok(())
+        if input.flags & GIB_SPEED_VARIATION_STOP != 0 {
+            self.set_out();
+        }
     }
 
-    /// Largest change in a cycle whose overshoot behind the lower corner the motor's power still allows. Of a swing of more
-    /// than 2 % it bounds nothing: the power is used up at the top.
-    fn corner_rate(&self) -> f64 {
-        const OVERSHOOT: f64 = 0.042;
-        let (Motor { power, used, viscous, .. }, [low, _]) = (self.motor, self.corners);
-        let left = power / low - used - viscous * low;
-        left.max(0.0) * self.per_nm / (1.0 + OVERSHOOT)
+    /// Counts with this cutting torque (N·m) from now on.
+    fn load(&mut self, cutting: f64) {
+        let used = self.plan.motor_cutting(cutting).used;
+        self.motor.used = used;
+        self.brake_help = self.plan.brake_help(used);
+        let Motor { power, torque, viscous, .. } = self.motor;
+        self.in_changes = [power, torque, used, viscous].map(|nm| nm * self.per_nm);
+    }
+
+    /// Begins to work out what is asked for, unless the cycles go by it already.
+    fn begin_work(&mut self) {
+        if self.asked != self.now.asked {
+            (self.next.asked, self.piece) = (self.asked, Piece::Amplitude);
+        }
+    }
+
+    /// One piece of that. What is asked for meanwhile comes next.
+    fn work(&mut self) {
+        if self.piece != Piece::Nothing {
+            self.piece = self.next.work(&self.plan, self.piece);
+            if self.piece == Piece::Nothing {
+                self.go_by_next();
+                self.begin_work();
+            }
+        }
+    }
+
+    /// From now on the cycles go by what was worked out. Less is granted at once; the speed follows at the motor's own pace.
+    fn go_by_next(&mut self) {
+        let next = self.next;
+        self.output.amplitude_ratio = next.granted;
+        self.output.amplitude_limit_ratio = next.possible;
+        self.output.period_limit_s = next.shortest;
+        let less = next.granted < next.asked[1] * (1.0 - 1e-9);
+        self.output.message = if less { code(next.limit) } else { GIB_OK };
+        // The phasor's cosine is half a cycle late, and the cycle's angle is another now.
+        let ([cos, sin], [half_cos, half_sin]) = (self.phasor, self.now.half);
+        let cos = (cos - sin * half_sin) / half_cos;
+        let length = (cos * cos + sin * sin).sqrt();
+        let (cos, sin) = if length > 0.5 { (cos / length, sin / length) } else { (1.0, 0.0) };
+        self.phasor = [cos * next.half[0] + sin * next.half[1], sin];
+        self.turn = 2.0 * next.half[1];
+        self.swing = self.swing.min(next.swing);
+        self.now = next;
+        if self.phase == Phase::Begin {
+            self.enter(Phase::Running);
+        }
     }
 
     /// One cycle back toward the mean, with what cutting leaves now, whatever else is wrong with the input.
     fn go_back(&mut self, input: &SpeedVariationInput) {
         if (0.0..=MOST_CUTTING).contains(&input.cutting_nm) {
-            self.motor.used = self.plan.motor_cutting(input.cutting_nm).used;
-            self.brake_help = self.motor.used + self.plan.motor.used;
+            self.load(input.cutting_nm);
         }
-        let missing = self.mean - self.speed;
+        let missing = self.mean() - self.speed;
         self.go(missing.max(-self.back).min(self.back));
         self.patience = self.patience.saturating_sub(1);
-        let there = (self.mean - self.speed).abs() <= 1e-9 * self.mean;
+        let there = (self.mean() - self.speed).abs() <= 1e-9 * self.mean();
         if !there && self.patience == 0 && self.fault == Fault::NONE {
             self.fault = Fault::of(GIB_ERR_SPEED_VARIATION_NONE);
             self.output.message = GIB_ERR_SPEED_VARIATION_NONE;
@@ -375,8 +384,8 @@ impl SpeedVariation {
     /// Sets out for the mean, at the variation's own rate but not slower than a tenth of it in a second.
     fn set_out(&mut self) {
         const SLOWEST_1_S: f64 = 0.1;
-        self.back = self.rate.max(SLOWEST_1_S * self.mean * self.plan.cycle_s);
-        let cycles = 2.0 * (self.mean - self.speed).abs() / self.back + 1.0 / self.plan.cycle_s;
+        self.back = self.now.rate.max(SLOWEST_1_S * self.mean() * self.plan.cycle_s);
+        let cycles = 2.0 * (self.mean() - self.speed).abs() / self.back + 1.0 / self.plan.cycle_s;
         self.patience = cycles as u32;
         self.enter(Phase::Stopping);
     }

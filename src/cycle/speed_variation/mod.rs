@@ -15,6 +15,7 @@ pub mod io;
 pub mod limit;
 pub mod machine;
 pub mod plan;
+pub mod setting;
 
 #[cfg(test)]
 mod command_tests;

@@ -131,6 +131,24 @@ impl Plan {
         Motor { used: self.motor.used + cutting.max(self.cutting), ..self.motor }
     }
 
+    /// That motor as the command may use it.
+    #[must_use]
+    pub fn driving(&self, motor: Motor) -> Motor {
+        // The last trifle is the speed loop's, which follows the command with a little overshoot.
+        const FOLLOWED: f64 = 0.9955;
+        // The print knows no limit at the top of the swing, and is shown without one.
+        const ENDLESS: f64 = 1e30;
+        let [power, torque] =
+            if self.published { [ENDLESS; 2] } else { [motor.power, motor.torque].map(|most| FOLLOWED * most) };
+        Motor { power, torque, ..motor }
+    }
+
+    /// Friction that helps to brake beside `used` (N·m): without cutting, which may end at any moment.
+    #[must_use]
+    pub fn brake_help(&self, used: f64) -> f64 {
+        used + self.motor.used
+    }
+
     /// Largest amplitude by the formula chosen.
     #[must_use]
     pub fn possible(&self, motor: &Motor, mean: f64, period: f64) -> (f64, Limit) {

@@ -20,7 +20,7 @@ impl SpeedVariation {
             Wave::Triangle => self.speed += self.steady,
             Wave::Sine => {
                 let (phasor, swing) = (self.turned(), self.swing + self.steady);
-                let target = self.mean + swing * phasor[1];
+                let target = self.now.asked[0] + swing * phasor[1];
                 let change = target - self.speed;
                 let faster = if target > self.speed { target } else { self.speed };
                 let [power, torque, used, viscous] = self.in_changes;
@@ -47,13 +47,14 @@ impl SpeedVariation {
     /// Grants the cycles that are like this one, in which the speed went by `change`.
     pub(super) fn grant(&mut self, change: f64) {
         (self.quiet, self.steady) = match self.plan.wave {
+            _ if self.piece != Piece::Nothing => (0, 0.0),
             Wave::Triangle => (self.slope_left(change), change),
             Wave::Sine => {
-                let missing = self.swing_goal - self.swing;
+                let (missing, rate) = (self.now.swing - self.swing, self.now.swing_rate);
                 if missing == 0.0 {
                     (i32::MAX, 0.0)
-                } else if missing >= self.swing_rate {
-                    ((missing / self.swing_rate) as i32, self.swing_rate)
+                } else if missing >= rate {
+                    ((missing / rate) as i32, rate)
                 } else {
                     (0, 0.0)
                 }
@@ -64,9 +65,7 @@ impl SpeedVariation {
     /// Cycles in which a triangle goes on at its rate, neither turned at a corner nor held by the motor; one of them is kept
     /// back for rounding.
     fn slope_left(&self, change: f64) -> i32 {
-        let [low, high] = self.corners;
-        let [rise, brake] = self.free;
-        let rate = self.rate;
+        let Setting { corners: [low, high], free: [rise, brake], rate, .. } = self.now;
         // In the sense it goes on in: a corner met exactly has turned it, though the change was still the old one.
         let steady = ((if self.rising { change } else { -change }) - rate).abs() <= 1e-9 * rate;
         let way = match self.rising {

@@ -1,0 +1,115 @@
+//! What the cycles of a variation go by: all that follows from mean speed, amplitude, period and load.
+//!
+//! It is worked out a piece a cycle, so that a change costs no cycle much; meanwhile the setting before goes on.
+
+use super::limit::{Limit, Motor};
+use super::plan::Plan;
+use core::f64::consts::PI;
+
+/// What the kernel asks for: mean speed (rad/s), amplitude (share of it), period (s), cutting torque (N·m).
+pub type Asked = [f64; 4];
+
+/// The piece that is due.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Piece {
+    /// Largest amplitude; ends in its cycle, as the others do.
+    Amplitude,
+    /// Shortest period.
+    Period,
+    /// Corner speeds and rates.
+    Corners,
+    /// Speeds up to which the motor has enough, and the turn of a sine's phasor. The setting is whole then.
+    Rest,
+    /// Nothing is due; ends with a change of what is asked for.
+    Nothing,
+}
+
+/// Speeds in rad/s, positive in the sense of rotation.
+#[derive(Debug, Clone, Copy)]
+pub struct Setting {
+    /// What it is for.
+    pub asked: Asked,
+    /// Amplitude in effect, and the largest and what limits it.
+    pub granted: f64,
+    /// See `granted`.
+    pub possible: f64,
+    /// See `granted`.
+    pub limit: Limit,
+    /// Shortest period, s; 0: none.
+    pub shortest: f64,
+    /// Corner speeds of a triangle, its change of speed in a cycle, and the highest speeds at which the motor can rise and brake
+    /// at that rate.
+    pub corners: [f64; 2],
+    /// See `corners`.
+    pub rate: f64,
+    /// See `corners`.
+    pub free: [f64; 2],
+    /// A sine's swing, its change in a cycle, and cosine and sine of half the angle that its phasor turns in a cycle.
+    pub swing: f64,
+    /// See `swing`.
+    pub swing_rate: f64,
+    /// See `swing`.
+    pub half: [f64; 2],
+}
+
+impl Setting {
+    /// Standing at a mean speed (rad/s).
+    #[must_use]
+    pub fn still(mean: f64) -> Setting {
+        Setting {
+            asked: [mean, 0.0, 0.0, 0.0],
+            granted: 0.0,
+            possible: 0.0,
+            limit: Limit::Nothing,
+            shortest: 0.0,
+            corners: [mean; 2],
+            rate: 0.0,
+            free: [0.0; 2],
+            swing: 0.0,
+            swing_rate: 0.0,
+            half: [1.0, 0.0],
+        }
+    }
+
+    /// Works out one piece; returns the next.
+    pub fn work(&mut self, plan: &Plan, piece: Piece) -> Piece {
+        let [mean, amplitude, period, cutting] = self.asked;
+        let motor = plan.motor_cutting(cutting);
+        match piece {
+            Piece::Amplitude => {
+                (self.possible, self.limit) = plan.possible(&motor, mean, period);
+                self.granted = amplitude.min(self.possible);
+                Piece::Period
+            }
+            Piece::Period => {
+                self.shortest = plan.shortest(&motor, mean, amplitude);
+                Piece::Corners
+            }
+            Piece::Corners => {
+                let granted = self.granted;
+                self.corners = [mean * (1.0 - granted), mean * (1.0 + granted)];
+                self.swing = granted * mean;
+                self.swing_rate = self.swing * plan.cycle_s / period;
+                self.rate = corner_rate(plan, &motor, self.corners[0]).min(4.0 * self.swing_rate);
+                Piece::Rest
+            }
+            Piece::Rest => {
+                let (driving, torque) = (plan.driving(motor), self.rate * plan.motor.inertia / plan.cycle_s);
+                self.free = [0.0, plan.brake_help(motor.used)].map(|help| driving.fastest(torque - help));
+                let sin = (PI * plan.cycle_s / period).sin();
+                self.half = [(1.0 - sin * sin).sqrt(), sin];
+                Piece::Nothing
+            }
+            Piece::Nothing => Piece::Nothing,
+        }
+    }
+}
+
+/// Largest change in a cycle whose overshoot behind the lower corner the motor's power still allows. Of a swing of more
+/// than 2 % it bounds nothing: the power is used up at the top.
+fn corner_rate(plan: &Plan, motor: &Motor, low: f64) -> f64 {
+    const OVERSHOOT: f64 = 0.042;
+    let Motor { power, used, viscous, .. } = plan.driving(*motor);
+    let left = power / low - used - viscous * low;
+    left.max(0.0) * plan.cycle_s / plan.motor.inertia / (1.0 + OVERSHOOT)
+}
