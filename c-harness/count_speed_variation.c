@@ -44,7 +44,9 @@ static int count(int waveform, const char *label)
     if (gib_speed_variation_start(gib, &c) != GIB_OK) {
         return 1;
     }
-    labelled_step(gib, &in, "change");
+    for (int i = 0; i < 10; i++) {
+        labelled_step(gib, &in, "change");
+    }
     for (int i = 0; i < 4000; i++) {
         labelled_step(gib, &in, label);
     }
@@ -53,7 +55,7 @@ static int count(int waveform, const char *label)
         in.speed_rpm = 1000.0 - 0.5 * i;
         in.period_s = 1.0 + 0.1 * (i % 7);
         in.cutting_nm = 20.0 + (i % 3);
-        for (int k = 0; k < 7; k++) {
+        for (int k = 0; k < 10; k++) {
             labelled_step(gib, &in, "change");
         }
         for (int k = 0; k < 50; k++) {

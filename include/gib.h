@@ -2805,7 +2805,7 @@ typedef struct gib_speed_variation_config {
 #define gib_speed_variation_config_FIRST_SIZE 136
 
 /**
- * What the kernel asks for in a cycle. Values may change at any time.
+ * What the kernel asks for in a cycle. Values may change in any cycle; a change takes effect within 10 cycles.
  */
 typedef struct gib_speed_variation_input {
     /**
@@ -2847,15 +2847,16 @@ typedef struct gib_speed_variation_output {
      */
     double torque_nm;
     /**
-     * Amplitude in effect: the one asked for, or the largest possible one where that is less.
+     * Amplitude in effect: the one asked for, or the largest possible one where that is less; 0 until the first is worked
+     * out.
      */
     double amplitude_ratio;
     /**
-     * Largest amplitude possible at the period and speed asked for.
+     * Largest amplitude possible at the period, speed and cutting torque in effect.
      */
     double amplitude_limit_ratio;
     /**
-     * Shortest period possible at the amplitude and speed asked for, s; 0: none.
+     * Shortest period possible at the amplitude asked for and the speed and cutting torque in effect, s; 0: none.
      */
     double period_limit_s;
     /**
@@ -5950,7 +5951,8 @@ int32_t gib_speed_variation_start(struct gib_speed_variation *handle,
  *
  * It begins and ends at the mean speed without a jump. Mean speed, amplitude, period and cutting torque may change in
  * any cycle; torque, power and speed stay within the motor's. Where more is asked for than it can do, the amplitude
- * is cut to what it can, and `message` says why. A cycle in which something changes costs more than the others.
+ * is cut to what it can, and `message` says why. What a change leads to is worked out over the cycles that follow, a piece in
+ * each: it takes effect within 10 cycles, and until then the variation goes on as before. Cutting torque counts at once.
  *
  * @param handle the instance.
  * @param input what is asked for in this cycle.

@@ -126,7 +126,8 @@ pub unsafe extern "C" fn gib_speed_variation_start(
 ///
 /// It begins and ends at the mean speed without a jump. Mean speed, amplitude, period and cutting torque may change in
 /// any cycle; torque, power and speed stay within the motor's. Where more is asked for than it can do, the amplitude
-/// is cut to what it can, and `message` says why. A cycle in which something changes costs more than the others.
+/// is cut to what it can, and `message` says why. What a change leads to is worked out over the cycles that follow, a piece in
+/// each: it takes effect within 10 cycles, and until then the variation goes on as before. Cutting torque counts at once.
 ///
 /// @param handle the instance.
 /// @param input what is asked for in this cycle.

@@ -14,7 +14,7 @@ pub const GIB_SPEED_VARIATION_FAILED: i32 = 4;
 /// Input flag: end the variation; the speed goes back to its mean, then `GIB_DONE`.
 pub const GIB_SPEED_VARIATION_STOP: u32 = 8;
 
-/// What the kernel asks for in a cycle. Values may change at any time.
+/// What the kernel asks for in a cycle. Values may change in any cycle; a change takes effect within 10 cycles.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SpeedVariationInput {
@@ -40,11 +40,12 @@ pub struct SpeedVariationOutput {
     pub speed_command_rpm: f64,
     /// Torque that the commanded change of speed takes, J·ω', N·m: feed-forward for the drive.
     pub torque_nm: f64,
-    /// Amplitude in effect: the one asked for, or the largest possible one where that is less.
+    /// Amplitude in effect: the one asked for, or the largest possible one where that is less; 0 until the first is worked
+    /// out.
     pub amplitude_ratio: f64,
-    /// Largest amplitude possible at the period and speed asked for.
+    /// Largest amplitude possible at the period, speed and cutting torque in effect.
     pub amplitude_limit_ratio: f64,
-    /// Shortest period possible at the amplitude and speed asked for, s; 0: none.
+    /// Shortest period possible at the amplitude asked for and the speed and cutting torque in effect, s; 0: none.
     pub period_limit_s: f64,
     /// What the step returned: `GIB_OK`, `GIB_BUSY`, `GIB_DONE` or the first error.
     pub status: i32,

@@ -25,8 +25,7 @@ use crate::units::rpm_from_rad_s;
 enum Phase {
     /// Nothing is varied; ends with a start.
     Idle,
-    /// The first input says what is wanted, which is worked out while the speed follows its mean; ends after
-    /// [`WORKED_OUT`] cycles.
+    /// Waits for the first input, which says at what speed to stand until a variation is worked out; ends at once.
     Begin,
     /// The speed varies; ends with a stop, an abort or a fault.
     Running,
@@ -39,7 +38,7 @@ enum Phase {
 }
 
 /// Cycles in which a change is worked out, at most: it may come when the work for another has just begun.
-pub const WORKED_OUT: u32 = 7;
+pub const WORKED_OUT: u32 = 10;
 
 /// Two values of an input, side by side: aligned, so that a processor compares both at once.
 #[derive(Debug, Clone, Copy, Default)]
@@ -262,6 +261,7 @@ impl SpeedVariation {
     pub fn turn(&mut self, input: &SpeedVariationInput) {
         self.quiet += 1;
         match self.phase {
+            Phase::Running if self.piece == Piece::Nothing && self.same(input) => self.advance(),
             Phase::Idle | Phase::Done | Phase::Failed => {
                 if input.speed_rpm.is_finite() {
                     self.output.speed_command_rpm = input.speed_rpm;
@@ -276,10 +276,10 @@ impl SpeedVariation {
                 }
             }
             Phase::Begin | Phase::Running => {
+                self.work();
                 if !self.same(input) {
                     self.take(input);
                 }
-                self.work();
                 match self.phase {
                     Phase::Running => self.advance(),
                     Phase::Stopping => self.go_back(input),
@@ -300,14 +300,17 @@ impl SpeedVariation {
             Ok(asked) => self.asked = asked,
             Err(fault) => return self.leave(fault),
         }
+        if self.phase == Phase::Begin {
+            self.speed = self.asked[0];
+            self.now = Setting::still(self.speed);
+            self.output.speed_command_rpm = self.speed * self.to_rpm;
+            self.enter(Phase::Running);
+        }
         if self.piece == Piece::Nothing {
             self.begin_work();
         }
         self.load(self.asked[3]);
-        if self.phase == Phase::Begin {
-            self.speed = self.asked[0];
-            self.output.speed_command_rpm = self.speed * self.to_rpm;
-        }
+        self.quiet = 0;
         if input.flags & GIB_SPEED_VARIATION_STOP != 0 {
             self.set_out();
         }
@@ -332,9 +335,11 @@ impl SpeedVariation {
     /// One piece of that. What is asked for meanwhile comes next.
     fn work(&mut self) {
         if self.piece != Piece::Nothing {
+            if self.piece == Piece::Whole {
+                self.go_by_next();
+            }
             self.piece = self.next.work(&self.plan, self.piece);
             if self.piece == Piece::Nothing {
-                self.go_by_next();
                 self.begin_work();
             }
         }
@@ -356,16 +361,17 @@ impl SpeedVariation {
         self.phasor = [cos * next.half[0] + sin * next.half[1], sin];
         self.turn = 2.0 * next.half[1];
         self.swing = self.swing.min(next.swing);
+        // What has stood begins upward.
+        self.rising |= self.now.rate == 0.0;
         self.now = next;
-        if self.phase == Phase::Begin {
-            self.enter(Phase::Running);
-        }
     }
 
     /// One cycle back toward the mean, with what cutting leaves now, whatever else is wrong with the input.
     fn go_back(&mut self, input: &SpeedVariationInput) {
-        if (0.0..=MOST_CUTTING).contains(&input.cutting_nm) {
-            self.load(input.cutting_nm);
+        let cutting = input.cutting_nm;
+        if cutting != self.asked[3] && (0.0..=MOST_CUTTING).contains(&cutting) {
+            self.asked[3] = cutting;
+            self.load(cutting);
         }
         let missing = self.mean() - self.speed;
         self.go(missing.max(-self.back).min(self.back));
@@ -433,7 +439,17 @@ fn pairs(input: &SpeedVariationInput) -> [Pair; 2] {
 }
 
 /// Anything in this cycle's input that must end a variation.
+#[inline(always)]
 fn danger(input: &SpeedVariationInput) -> Option<Fault> {
+    // What is no number makes the sum none, and taken from itself nothing else is left of a number.
+    let sum = (input.speed_rpm + input.amplitude_ratio) + (input.period_s + input.cutting_nm);
+    let fine = sum - sum == 0.0 && input.flags & !GIB_SPEED_VARIATION_STOP == 0;
+    if fine { None } else { named(input) }
+}
+
+/// The name of what is wrong with an input.
+#[cold]
+fn named(input: &SpeedVariationInput) -> Option<Fault> {
     match input.flags & !GIB_SPEED_VARIATION_STOP {
         0 => {}
         flags if flags & GIB_INPUT_FAULT != 0 => return Some(Fault::of(GIB_ERR_DRIVE_FAULT)),

@@ -18,8 +18,10 @@ pub enum Piece {
     Period,
     /// Corner speeds and rates.
     Corners,
-    /// Speeds up to which the motor has enough, and the turn of a sine's phasor. The setting is whole then.
+    /// Speeds up to which the motor has enough, and the turn of a sine's phasor.
     Rest,
+    /// All is there, for the cycles to go by.
+    Whole,
     /// Nothing is due; ends with a change of what is asked for.
     Nothing,
 }
@@ -98,9 +100,9 @@ impl Setting {
                 self.free = [0.0, plan.brake_help(motor.used)].map(|help| driving.fastest(torque - help));
                 let sin = (PI * plan.cycle_s / period).sin();
                 self.half = [(1.0 - sin * sin).sqrt(), sin];
-                Piece::Nothing
+                Piece::Whole
             }
-            Piece::Nothing => Piece::Nothing,
+            Piece::Whole | Piece::Nothing => Piece::Nothing,
         }
     }
 }
