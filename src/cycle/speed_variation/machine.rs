@@ -441,9 +441,9 @@ fn pairs(input: &SpeedVariationInput) -> [Pair; 2] {
 /// Anything in this cycle's input that must end a variation.
 #[inline(always)]
 fn danger(input: &SpeedVariationInput) -> Option<Fault> {
-    // What is no number makes the sum none, and taken from itself nothing else is left of a number.
+    // What is no number makes the sum none; one so large that it overflows is looked at by name, too.
     let sum = (input.speed_rpm + input.amplitude_ratio) + (input.period_s + input.cutting_nm);
-    let fine = sum - sum == 0.0 && input.flags & !GIB_SPEED_VARIATION_STOP == 0;
+    let fine = sum.is_finite() && input.flags & !GIB_SPEED_VARIATION_STOP == 0;
     if fine { None } else { named(input) }
 }
 
