@@ -31,6 +31,7 @@ pub fn picture(found: &Found) -> Result<String, PlotError> {
             beyond(mean.threshold_mm),
         ),
         x_label: format!("way beyond the contact point / {fine}"),
+        x_decades: false,
         y_label: format!("{} toward the stop / {effort}", word.to_lowercase()),
         series: vec![
             series("touches", Colour::Grey, found.touches.iter().map(|touch| dots(&touch.curve)).collect()),

@@ -23,6 +23,7 @@ pub fn picture(found: &Found) -> Result<String, PlotError> {
         title: format!("Inertia {} kg·m², ± {} (95 %)", short(value), short(r.total_uncertainty_kg_m2)),
         subtitle: "a dot: one stretch of the recording, its friction taken off; the slope is the inertia".into(),
         x_label: "acceleration / rpm/s".into(),
+        x_decades: false,
         y_label: "torque that accelerates / N·m".into(),
         series: vec![
             series("interval", Colour::Blue, Mark::Band(ends.map(|a| (rpm_s(a), least * a, most * a)).to_vec())),
@@ -43,6 +44,7 @@ pub fn picture(found: &Found) -> Result<String, PlotError> {
         title: format!("Friction: {} N·m and {} N·m·s/rad", short(r.coulomb_nm), short(r.viscous_nm_s)),
         subtitle: "the same stretches, inertia × acceleration taken off".into(),
         x_label: "speed / rpm".into(),
+        x_decades: false,
         y_label: "torque that friction takes / N·m".into(),
         series: vec![
             series(

@@ -63,6 +63,7 @@ fn differences(found: &LostMotion, display: &Display) -> Panel {
             found.reversals.len()
         ),
         x_label: format!("motor position / {}", found.unit),
+        x_decades: false,
         y_label: format!("motor − table / {}", display.unit),
         series: vec![way(1, "positive direction", Colour::Blue), way(-1, "negative direction", Colour::Orange)],
     }
@@ -83,6 +84,7 @@ fn along_the_stroke(found: &LostMotion, display: &Display) -> Panel {
         title: "Lost motion along the stroke".into(),
         subtitle: "each stretch with its uncertainty, and the mean with its band (k = 2)".into(),
         x_label: format!("motor position / {}", found.unit),
+        x_decades: false,
         y_label: format!("lost motion / {}", display.unit),
         series: vec![
             Series {
@@ -127,6 +129,7 @@ pub fn torque_picture(found: &TorqueLostMotion) -> Result<String, PlotError> {
             u = display.unit
         ),
         x_label: format!("motor travel since the reversal / {}", display.unit),
+        x_decades: false,
         y_label: format!("{quantity} in the new direction / {unit}"),
         series: vec![way(1, "turning to positive", Colour::Blue), way(-1, "turning to negative", Colour::Orange)],
     };

@@ -75,6 +75,8 @@ pub struct Panel {
     pub subtitle: String,
     /// Quantity and unit: `position / mm`.
     pub x_label: String,
+    /// Whether x is the common logarithm of what the label names; the ticks then say the value itself.
+    pub x_decades: bool,
     /// See `x_label`.
     pub y_label: String,
     /// The data, first below.
@@ -98,6 +100,8 @@ const WIDTH: u32 = 960;
 const HEIGHT: u32 = 480;
 const INK: RGBColor = RGBColor(40, 40, 40);
 const RULE: RGBColor = RGBColor(225, 225, 225);
+/// How much of its colour a band keeps.
+const BAND: f64 = 0.18;
 const FONT: &str = "Helvetica, Arial, sans-serif";
 
 /// Draws the panels below each other.
@@ -153,7 +157,7 @@ fn draw(panel: &Panel, area: &Area) -> Result<(), PlotError> {
         .label_style((FONT, 14).into_font().color(&INK))
         .x_labels(8)
         .y_labels(7)
-        .x_label_formatter(&|value| tick(*value, x.1 - x.0))
+        .x_label_formatter(&|value| if panel.x_decades { of_decade(*value) } else { tick(*value, x.1 - x.0) })
         .y_label_formatter(&|value| tick(*value, y.1 - y.0))
         .draw()
         .map_err(failed)?;
@@ -214,7 +218,7 @@ fn add(chart: &mut Chart, series: &Series) -> Result<(), PlotError> {
                 let finite = || points.iter().filter(|p| (p.0 + p.1 + p.2).is_finite());
                 let outline: Vec<(f64, f64)> =
                     finite().map(|p| (p.0, p.1)).chain(finite().rev().map(|p| (p.0, p.2))).collect();
-                Some(chart.draw_series(std::iter::once(Polygon::new(outline, colour.mix(0.18)))).map_err(failed)?)
+                Some(chart.draw_series(std::iter::once(Polygon::new(outline, colour.mix(BAND)))).map_err(failed)?)
             }
             Mark::Columns(points, wide) => {
                 let finite = points.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
@@ -225,7 +229,9 @@ fn add(chart: &mut Chart, series: &Series) -> Result<(), PlotError> {
             }
         };
         if let (Some(annotation), true) = (annotation, i == last && !series.name.is_empty()) {
-            let key = move |(x, y): (i32, i32)| Rectangle::new([(x + 2, y - 2), (x + 22, y + 2)], colour.filled());
+            let shade = if matches!(mark, Mark::Band(_)) { BAND } else { 1.0 };
+            let key =
+                move |(x, y): (i32, i32)| Rectangle::new([(x + 2, y - 2), (x + 22, y + 2)], colour.mix(shade).filled());
             // plotters guesses a text's width, and too small where a font is wide: two spaces give the legend room.
             annotation.label(format!("{}\u{a0}\u{a0}", series.name)).legend(key);
         }
@@ -285,6 +291,13 @@ impl Panel {
     }
 }
 
+/// A tick of a logarithmic axis: two digits of the value.
+fn of_decade(exponent: f64) -> String {
+    let decimals = (1.0 - exponent.floor()).clamp(0.0, 9.0) as usize;
+    let text = format!("{:.decimals$}", 10f64.powf(exponent));
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
 /// A tick's number with as many decimals as the range needs, and a true minus.
 fn tick(value: f64, range: f64) -> String {
     let decimals = (1.0 - (range / 5.0).log10()).floor().clamp(0.0, 9.0) as usize;
@@ -327,5 +340,6 @@ mod tests {
         assert_eq!(tick(-0.05, 0.3), "−0.05");
         assert_eq!(tick(150.0, 400.0), "150");
         assert_eq!(tick(-0.0, 4.0), "0.0");
+        assert_eq!([-2.0, -0.5, 0.0, 0.5, 2.0].map(of_decade), ["0.01", "0.32", "1", "3.2", "100"]);
     }
 }

@@ -30,11 +30,11 @@ fn panel(diagnosis: &Diagnosis, view: &View) -> Panel {
         Coordinate::Direction => "direction".to_owned(),
         Coordinate::Acceleration => format!("acceleration / {load}/s²"),
         Coordinate::Time => "time / s".to_owned(),
-        Coordinate::SinceReversal => format!("log₁₀ of the travel since the reversal in {load}"),
-        Coordinate::Frequency => "log₁₀ of the frequency in Hz".to_owned(),
+        Coordinate::SinceReversal => format!("travel since the reversal / {load}"),
+        Coordinate::Frequency => "frequency / Hz".to_owned(),
     };
-    let log = spectrum || view.coordinate == Coordinate::SinceReversal;
-    let at = |x: f64| if log { x.log10() } else { x };
+    let x_decades = spectrum || view.coordinate == Coordinate::SinceReversal;
+    let at = |x: f64| if x_decades { x.log10() } else { x };
     // A direction is one of two: a column up to its mean for each, side by side.
     let line = |name: &str, colour, aside: f64, pick: fn(&(f64, f64, f64)) -> f64| {
         let points = view.curve.iter().map(|p| (at(p.0), pick(p)));
@@ -58,6 +58,7 @@ fn panel(diagnosis: &Diagnosis, view: &View) -> Panel {
         ),
         subtitle: format!("goes with it: {goes}"),
         x_label,
+        x_decades,
         y_label: format!("{} / {unit}", if spectrum { "amplitude" } else { "mean residual" }),
         series,
     }

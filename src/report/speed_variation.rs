@@ -42,6 +42,7 @@ pub fn picture(motor: &Motor, wave: Wave, mean: f64, recommended: (f64, f64)) ->
         title: format!("Speed variation at {:.0} rpm, {:.4} kg·m²", rpm_from_rad_s(mean), motor.inertia),
         subtitle: "largest amplitude of the motor; above the line its power, torque or speed does not suffice".into(),
         x_label: "period / s".into(),
+        x_decades: false,
         y_label: "amplitude / %".into(),
         series: vec![
             series("published", Colour::Orange, line(|p| 100.0 * p.published)),
@@ -53,6 +54,7 @@ pub fn picture(motor: &Motor, wave: Wave, mean: f64, recommended: (f64, f64)) ->
         title: "Power at the top of the swing".into(),
         subtitle: "over the motor's power, with friction and cutting".into(),
         x_label: "period / s".into(),
+        x_decades: false,
         y_label: "power / motor's power".into(),
         series: vec![
             series("published", Colour::Orange, line(|p| p.drawn)),
