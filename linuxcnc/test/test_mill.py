@@ -194,6 +194,7 @@ def inertia_and_variation():
     command.program_open(os.path.abspath("part.ngc"))
     command.wait_complete()
     told()
+    without_a_value()
     mdi("M112")
     with open("part.ngc", encoding="utf-8") as file:
         head = file.read()
@@ -205,6 +206,26 @@ def inertia_and_variation():
     path = recorded(run_part)
     check(pin("gib-inertia.0.ina") == written[0], f"INA reached the component: {pin('gib-inertia.0.ina')}; {told()}")
     speed_varies(columns(path, "time_s", "spindle.commanded_speed_rpm", "spindle.speed_rpm", "spindle.torque_nm"))
+
+
+def without_a_value():
+    """One slow, short ramp under a noisy torque does not determine the inertia: M112 ends with an error, no INA is written, and
+    what was known before stays."""
+    def known():
+        with open("part.ngc", encoding="utf-8") as file:
+            return pin("gib-inertia.0.inertia"), pin("gib-inertia.0.coulomb"), file.read()
+    before = known()
+    poor = {"gib-inertia.0.speed-high": 30, "gib-inertia.0.ramp": 5, "gib-inertia.0.ramp-count": 1, "gib-sim-spindle.0.noise": 15}
+    good = {name: pin(name) for name in poor}
+    for name, value in poor.items():
+        hal.set_p(name, str(value))
+    mdi("M112", 120)
+    said = told()
+    for name, value in good.items():
+        hal.set_p(name, str(value))
+    error = pin("gib-inertia.0.error")
+    check(-399 <= error <= -300 and str(error) in said, f"M112 refuses what the motion does not determine: {error}; {said}")
+    check(not pin("gib-inertia.0.done") and known() == before, "no value and no INA comes of it")
 
 
 def speed_varies(recording):

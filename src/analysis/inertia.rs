@@ -10,7 +10,7 @@ use crate::cycle::inertia::blocks::{BLOCKS, Block, Gate, Gather};
 use crate::cycle::inertia::fit::Question;
 use crate::cycle::inertia::report::InertiaReport;
 use crate::error::{Fault, GIB_ERR_INERTIA_EXCITATION, status_text};
-use crate::recording::{Recording, RecordingError, Signal, Unit};
+use crate::recording::{Column, Recording, RecordingError, Signal, Unit};
 
 /// What is known beside the recording. `None` and 0: not known.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +19,8 @@ pub struct Options {
     pub channel: String,
     /// Torque constant, N·m/A: torque is current × constant in place of the torque column.
     pub torque_constant: Option<f64>,
+    /// Torque at 100 % load, N·m: torque is load × this in place of the torque column.
+    pub rated_torque_nm: Option<f64>,
     /// Speed above which the field is weakened, rpm.
     pub base_speed_rpm: Option<f64>,
     /// Torque above which the motor saturates, N·m.
@@ -38,6 +40,7 @@ impl Default for Options {
         Options {
             channel: "spindle".into(),
             torque_constant: None,
+            rated_torque_nm: None,
             base_speed_rpm: None,
             saturation_nm: None,
             takeup_s: 0.1,
@@ -119,10 +122,7 @@ pub fn measure(recording: &Recording, options: &Options) -> Result<Found, Record
     check(recording, options)?;
     let channel = &options.channel;
     let speed_column = recording.column(channel, Signal::Speed)?;
-    let (torque_column, unit, torque_nm) = match options.torque_constant {
-        Some(constant) => (recording.column(channel, Signal::Current)?, Unit::A, constant),
-        None => (recording.column(channel, Signal::Torque)?, Unit::Nm, 1.0),
-    };
+    let (torque_column, unit, torque_nm) = torque_source(recording, options)?;
     let wrong = |name: &str| RecordingError::new(&recording.file, "has another quantity's unit").in_column(name);
     let speed = speed_column.to(Unit::Rpm).ok_or_else(|| wrong(&speed_column.name))?;
     let torque = torque_column.to(unit).ok_or_else(|| wrong(&torque_column.name))?;
@@ -159,6 +159,34 @@ pub fn measure(recording: &Recording, options: &Options) -> Result<Found, Record
     }
 }
 
+/// The column that torque is from, the unit to take it in, and N·m per unit of it: what the options say; else what the drive
+/// delivered; else what it was asked for.
+fn torque_source<'a>(recording: &'a Recording, options: &Options) -> Result<(&'a Column, Unit, f64), RecordingError> {
+    let channel = &options.channel;
+    if let Some(constant) = options.torque_constant {
+        return Ok((recording.column(channel, Signal::Current)?, Unit::A, constant));
+    }
+    if let Some(rated) = options.rated_torque_nm {
+        let load = recording.column(channel, Signal::Load)?;
+        if !load.values.iter().any(|percent| *percent < 0.0) {
+            let message = "is never below 0, so that braking cannot be told from driving: record the torque, or a load with a sign";
+            return Err(RecordingError::new(&recording.file, message).in_column(&load.name));
+        }
+        return Ok((load, Unit::Percent, rated / 100.0));
+    }
+    let known = [Signal::Torque, Signal::TorqueCommand].into_iter().find_map(|signal| recording.get(channel, signal));
+    if let Some(column) = known {
+        return Ok((column, Unit::Nm, 1.0));
+    }
+    let there = |signal| recording.get(channel, signal).map(|column| column.name.as_str());
+    let how = match (there(Signal::Current), there(Signal::Load)) {
+        (Some(name), _) => format!("{name} will do with the torque constant (--torque-constant)"),
+        (None, Some(name)) => format!("{name} will do with the torque at 100 % (--rated-torque)"),
+        (None, None) => return recording.column(channel, Signal::Torque).map(|column| (column, Unit::Nm, 1.0)),
+    };
+    Err(RecordingError::new(&recording.file, format!("there is no column {channel}.torque_nm, and {how}")))
+}
+
 fn check(recording: &Recording, options: &Options) -> Result<(), RecordingError> {
     let positive = |name: &str, value: Option<f64>| match value {
         Some(value) if !(value > 0.0 && value.is_finite()) => {
@@ -171,6 +199,7 @@ fn check(recording: &Recording, options: &Options) -> Result<(), RecordingError>
         _ => Err(RecordingError::new(&recording.file, format!("{name} is {value}; it must be 0 or more"))),
     };
     positive("the torque constant", options.torque_constant)?;
+    positive("the rated torque", options.rated_torque_nm)?;
     positive("the base speed", options.base_speed_rpm)?;
     positive("the saturation torque", options.saturation_nm)?;
     positive("the uncertainty wanted", Some(options.target))?;
@@ -212,7 +241,6 @@ fn uniform<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::Column;
     use crate::units::rpm_from_rad_s;
 
     /// Trapezoids of speed at J 0.4, Tc 3, B 0.02, in the columns and units given.
@@ -268,6 +296,36 @@ mod tests {
         assert!(error.contains("spindle.torque_nm"), "{error}");
         let options = Options { torque_constant: Some(-1.0), ..Options::default() };
         assert!(measure(&recording, &options).unwrap_err().to_string().contains("torque constant"));
+    }
+
+    /// The same torque as asked for, or in percent of 20 N·m; what was delivered goes before what was asked for.
+    #[test]
+    fn torque_asked_for_or_load_with_its_rated_torque() {
+        let named = |name: &str, scale: f64| {
+            let mut recording = spindle(|i| i as f64 * 1e-3, false, 1.0);
+            let values = recording.columns[1].values.iter().map(|torque| scale * torque).collect();
+            recording.columns[1] = Column::new(name, values);
+            recording
+        };
+        let rated = Options { rated_torque_nm: Some(20.0), ..Options::default() };
+        let (asked_for, load) = (named("spindle.torque_command_nm", 1.0), named("spindle.load_percent", 5.0));
+        for (recording, options) in [(&asked_for, &Options::default()), (&load, &rated)] {
+            let found = measure(recording, options).unwrap();
+            assert!(found.refused.is_none() && (found.report.total_kg_m2 / 0.4 - 1.0).abs() < 0.01, "{found:?}");
+            assert_eq!(found.torque_column, recording.columns[1].name);
+        }
+        let mut both = named("spindle.torque_nm", 1.0);
+        both.columns.push(Column::new("spindle.torque_command_nm", vec![0.0; both.rows()]));
+        assert_eq!(measure(&both, &Options::default()).unwrap().torque_column, "spindle.torque_nm");
+        let refused = |recording: &Recording, options: &Options| measure(recording, options).unwrap_err().to_string();
+        assert!(refused(&load, &Options::default()).contains("--rated-torque"));
+        assert!(refused(&named("spindle.current_a", 1.0), &Options::default()).contains("--torque-constant"));
+        assert!(refused(&asked_for, &rated).contains("spindle.load_percent"));
+        let mut rectified = load.clone();
+        rectified.columns[1].values.iter_mut().for_each(|percent| *percent = percent.abs());
+        assert!(refused(&rectified, &rated).contains("never below 0"));
+        let none = Options { rated_torque_nm: Some(0.0), ..Options::default() };
+        assert!(refused(&load, &none).contains("rated torque"));
     }
 
     /// A motor that reports more torque than it delivers beyond 15 N·m reads as another inertia at one acceleration, and is said

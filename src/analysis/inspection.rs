@@ -168,7 +168,9 @@ fn suitability(recording: &Recording, channel: &str, motion: Option<&ChannelMoti
         Suitability { channel: channel.to_owned(), analysis, sufficient: missing.is_empty(), missing }
     };
     if has(Signal::Speed) || has(Signal::Angle) {
-        return vec![one("inertia and friction of the spindle", vec![need(Signal::Speed), need(Signal::Torque)])];
+        let effort = [Signal::Torque, Signal::TorqueCommand, Signal::Current, Signal::Load];
+        let torque = if effort.into_iter().any(has) { None } else { need(Signal::Torque) };
+        return vec![one("inertia and friction of the spindle", vec![need(Signal::Speed), torque])];
     }
     if motion.is_none() {
         return Vec::new();

@@ -21,7 +21,8 @@ use super::{Answer, Result};
 /// Ends with 1 when the motion does not determine the inertia; the text then says which ramp would.
 #[derive(Args)]
 pub struct InertiaCommand {
-    /// The recording: CSV with spindle.speed and spindle.torque (or spindle.current with --torque-constant)
+    /// The recording: CSV with spindle.speed and spindle.torque, else spindle.torque_command (or spindle.current with
+    /// --torque-constant, spindle.load with --rated-torque)
     recording: PathBuf,
     /// Draw what accelerates and what friction takes, as SVG
     #[arg(long, value_name = "FILE")]
@@ -35,6 +36,9 @@ pub struct InertiaCommand {
     /// Take current × this constant as torque, N·m/A
     #[arg(long, value_name = "NM_A")]
     torque_constant: Option<f64>,
+    /// Take load × this torque at 100 % as torque, N·m; the load must have a sign
+    #[arg(long, value_name = "NM", conflicts_with = "torque_constant")]
+    rated_torque: Option<f64>,
     /// Leave out what is faster: the field is weakened there (found by itself where it shows)
     #[arg(long, value_name = "RPM")]
     base_speed: Option<f64>,
@@ -94,6 +98,7 @@ impl InertiaCommand {
         Options {
             channel: self.channel.clone(),
             torque_constant: self.torque_constant,
+            rated_torque_nm: self.rated_torque,
             base_speed_rpm: self.base_speed,
             saturation_nm: self.saturation,
             takeup_s: self.takeup,
@@ -108,7 +113,15 @@ impl InertiaCommand {
 
     fn text(&self, found: &Found) -> String {
         let r = &found.report;
-        let mut text = format!("{}, torque from {}\n", self.recording.display(), found.torque_column);
+        let source = match (self.torque_constant, self.rated_torque, &found.torque_column) {
+            (Some(constant), _, column) => format!("{column} × {constant} N·m/A"),
+            (_, Some(rated), column) => format!("{column} of {rated} N·m"),
+            (_, _, column) if column.contains(".torque_command_") => {
+                format!("{column}: asked for, not delivered; a motor that gave less is not seen")
+            }
+            (_, _, column) => column.clone(),
+        };
+        let mut text = format!("{}, torque from {source}\n", self.recording.display());
         let blocks = format!("{} stretches of {} ms", r.blocks_used, number(1e3 * found.block_s, 3));
         let _ = writeln!(
             text,
