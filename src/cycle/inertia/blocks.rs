@@ -59,8 +59,9 @@ struct Sample([f64; 2]);
 #[derive(Debug, Clone, Copy)]
 pub struct Gather {
     calm: Calm,
-    /// Smallest and largest |sample| that counts.
+    /// Smallest and largest |sample| that counts; the smallest speed that does while it gathers.
     least: Sample,
+    standstill: f64,
     most: Sample,
     takeup: u32,
     /// Running sums S₁, S₂, S₃.
@@ -154,6 +155,7 @@ impl Gather {
         let rad_s = crate::units::rad_s_from_rpm(1.0);
         Gather {
             calm: Calm::default(),
+            standstill: gate.standstill,
             least: Sample([gate.standstill, 0.0]),
             most: Sample([gate.base.min(BEYOND), gate.saturation.min(BEYOND)]),
             takeup: gate.takeup,
@@ -186,6 +188,18 @@ impl Gather {
         self.skips = samples > 0;
         self.run = if self.skips { samples } else { self.length };
         self.sums = [Sample::default(); 3];
+    }
+
+    /// Gathers from here on, after `samples` that are left out.
+    pub fn resume(&mut self, samples: u32) {
+        self.least.0[0] = self.standstill;
+        self.leave_out(samples);
+    }
+
+    /// Gathers nothing until it is resumed. A spindle that stands meanwhile is no reason to look closer.
+    pub fn pause(&mut self) {
+        self.least.0[0] = 0.0;
+        self.leave_out(u32::MAX);
     }
 
     /// Samples that may be [taken](Self::take) before one must be [added](Self::add).

@@ -328,7 +328,11 @@ impl Inertia {
         };
         // What is gathered on the way to the first ramp and back is not asked for.
         let gathers = !matches!(phase, Phase::Begin | Phase::Approach | Phase::Return);
-        self.gather.leave_out(if gathers { plan.gate.takeup } else { u32::MAX });
+        if gathers {
+            self.gather.resume(plan.gate.takeup);
+        } else {
+            self.gather.pause();
+        }
         let change = if left > 0 { (goal - command) / f64::from(left) } else { 0.0 };
         self.change = [change, if gathers { self.progress_step } else { 0.0 }];
         self.left = left;
