@@ -2475,20 +2475,20 @@ typedef struct gib_inertia_config {
      */
     double cycle_s;
     /**
-     * Speed at which the ramps begin, rpm, at or above 0 (default a tenth of `speed_high_rpm`).
+     * Speed at which the ramps begin, rpm, without a sign: `standstill_rpm` to 0.9 of |`speed_high_rpm`| (default a tenth of it).
      */
     double speed_low_rpm;
     /**
-     * Speed at which the ramps end, rpm, up to 200000. Required for ramps. Negative: turns the other way.
+     * Speed at which the ramps end, rpm, ten times `standstill_rpm` to 200000. Required for ramps. Negative: turns the other way.
      */
     double speed_high_rpm;
     /**
      * Acceleration of the ramps, rpm/s; every second one has 0.6 of it, so that a motor that saturates is not taken for another
-     * inertia. Required for ramps.
+     * inertia. A ramp must take at most 600 s, and at least twice `takeup_s` and 16 cycles more than it. Required for ramps.
      */
     double acceleration_rpm_s;
     /**
-     * Time at constant speed after each ramp, up to 60 s (default 0.3).
+     * Time at constant speed after each ramp, a cycle to 60 s (default 0.3).
      */
     double hold_s;
     /**
@@ -2497,7 +2497,7 @@ typedef struct gib_inertia_config {
      */
     double takeup_s;
     /**
-     * Time to listen, up to 3600 s. Required for `GIB_INERTIA_LISTEN`.
+     * Time to listen, 256 cycles to 3600 s. Required for `GIB_INERTIA_LISTEN`.
      */
     double listen_s;
     /**
@@ -2519,15 +2519,15 @@ typedef struct gib_inertia_config {
      */
     double torque_bound_nm;
     /**
-     * Largest |command - speed| allowed, rpm (default: a quarter of `speed_high_rpm`).
+     * Largest |command - speed| allowed, 0.001 to 400000 rpm (default: a quarter of `speed_high_rpm`).
      */
     double lag_limit_rpm;
     /**
-     * Rated torque, N·m. Required for `GIB_TORQUE_PERMILLE`.
+     * Rated torque, 1e-6 to 1e6 N·m. Required for `GIB_TORQUE_PERMILLE`.
      */
     double rated_torque_nm;
     /**
-     * Torque constant, N·m/A. Required for `GIB_TORQUE_AMPERE`.
+     * Torque constant, 1e-9 to 1e6 N·m/A. Required for `GIB_TORQUE_AMPERE`.
      */
     double torque_constant_nm_a;
     /**
@@ -2536,7 +2536,7 @@ typedef struct gib_inertia_config {
      */
     double own_inertia_kg_m2;
     /**
-     * Its expanded uncertainty (k = 2), kg·m².
+     * Its expanded uncertainty (k = 2), 0 (default) to 1e6 kg·m².
      */
     double own_uncertainty_kg_m2;
     /**
@@ -2743,59 +2743,60 @@ typedef struct gib_speed_variation_config {
      */
     double cycle_s;
     /**
-     * Mean spindle speed, rpm; negative turns the other way. Required.
+     * Mean spindle speed, rpm, |speed| from `speed_min_rpm` (0.001 at least) to `speed_max_rpm`; negative turns the other way.
+     * Required.
      */
     double speed_rpm;
     /**
-     * Amplitude as a share of the mean speed, above 0 and below 1 (0.1 is ±10 %). Required to start.
+     * Amplitude as a share of the mean speed, 0.000001 to 0.999 (0.1 is ±10 %). Required to start.
      */
     double amplitude_ratio;
     /**
-     * Period of the variation, 0.02 to 600 s. Required to start.
+     * Period of the variation, 0.02 s and 8 cycles to 600 s. Required to start.
      */
     double period_s;
     /**
-     * Inertia of workpiece and chuck, kg·m²: measured, or `INA` from the program's head. Required.
+     * Inertia of workpiece and chuck, 1e-9 to 1e6 kg·m²: measured, or `INA` from the program's head. Required.
      */
     double inertia_kg_m2;
     /**
-     * The machine's own inertia (spindle, rotor), kg·m², added to it.
+     * The machine's own inertia (spindle, rotor), 0 (default) to 1e6 kg·m², added to it.
      */
     double own_inertia_kg_m2;
     /**
-     * Largest power of the motor, W. Required.
+     * Largest power of the motor, 0.001 to 1e9 W. Required.
      */
     double power_w;
     /**
-     * Largest torque of the motor at the spindle, N·m (default: only the power limits).
+     * Largest torque of the motor at the spindle, N·m, from 1e-6 (default: only the power limits).
      */
     double torque_nm;
     /**
-     * Highest speed allowed, rpm (default 200000).
+     * Highest speed allowed, 0.001 to 200000 rpm (default 200000).
      */
     double speed_max_rpm;
     /**
-     * Lowest speed allowed, rpm (default 0).
+     * Lowest speed allowed, 0 (default) to `speed_max_rpm`, rpm.
      */
     double speed_min_rpm;
     /**
-     * Coulomb friction of the spindle, N·m.
+     * Coulomb friction of the spindle, 0 (default) to 1e6 N·m.
      */
     double coulomb_nm;
     /**
-     * Viscous friction of the spindle, N·m·s/rad.
+     * Viscous friction of the spindle, 0 (default) to 1e6 N·m·s/rad.
      */
     double viscous_nm_s;
     /**
-     * Torque that cutting uses, N·m.
+     * Torque that cutting uses, 0 (default) to 1e6 N·m.
      */
     double cutting_nm;
     /**
-     * Share of torque and power to keep back, 0 to 0.9.
+     * Share of torque and power to keep back, 0 (default) to 0.9.
      */
     double reserve_ratio;
     /**
-     * Frequency of the chatter to be broken up, Hz; for the recommended values only (default: not known).
+     * Frequency of the chatter to be broken up, up to 100000 Hz; for the recommended values only (default: not known).
      */
     double chatter_hz;
 } gib_speed_variation_config;
@@ -2809,19 +2810,20 @@ typedef struct gib_speed_variation_config {
  */
 typedef struct gib_speed_variation_input {
     /**
-     * Mean spindle speed, rpm, with override; in the sense of the configuration.
+     * Mean spindle speed, rpm, with override; within the configuration's limits and in its sense, else
+     * GIB_ERR_SPEED_VARIATION_SPEED ends the variation.
      */
     double speed_rpm;
     /**
-     * Amplitude as a share of the mean speed; 0: as configured.
+     * Amplitude as a share of the mean speed, up to 0.999; 0: as configured.
      */
     double amplitude_ratio;
     /**
-     * Period, s; 0: as configured.
+     * Period, 0.02 s and 8 cycles to 600 s; 0: as configured.
      */
     double period_s;
     /**
-     * Torque that cutting uses now, N·m; the configuration's holds where that is more.
+     * Torque that cutting uses now, 0 to 1e6 N·m; the configuration's holds where that is more.
      */
     double cutting_nm;
     /**

@@ -28,19 +28,19 @@ pub struct InertiaConfig {
     pub reserved: i32,
     /// Servo period, 0.00005 to 0.02 s. Required.
     pub cycle_s: f64,
-    /// Speed at which the ramps begin, rpm, at or above 0 (default a tenth of `speed_high_rpm`).
+    /// Speed at which the ramps begin, rpm, without a sign: `standstill_rpm` to 0.9 of |`speed_high_rpm`| (default a tenth of it).
     pub speed_low_rpm: f64,
-    /// Speed at which the ramps end, rpm, up to 200000. Required for ramps. Negative: turns the other way.
+    /// Speed at which the ramps end, rpm, ten times `standstill_rpm` to 200000. Required for ramps. Negative: turns the other way.
     pub speed_high_rpm: f64,
     /// Acceleration of the ramps, rpm/s; every second one has 0.6 of it, so that a motor that saturates is not taken for another
-    /// inertia. Required for ramps.
+    /// inertia. A ramp must take at most 600 s, and at least twice `takeup_s` and 16 cycles more than it. Required for ramps.
     pub acceleration_rpm_s: f64,
-    /// Time at constant speed after each ramp, up to 60 s (default 0.3).
+    /// Time at constant speed after each ramp, a cycle to 60 s (default 0.3).
     pub hold_s: f64,
     /// Time after each change of acceleration or sense that is left out: take-up of belts and gears, and the
     /// drive's own transients, up to 5 s (default 0.1).
     pub takeup_s: f64,
-    /// Time to listen, up to 3600 s. Required for `GIB_INERTIA_LISTEN`.
+    /// Time to listen, 256 cycles to 3600 s. Required for `GIB_INERTIA_LISTEN`.
     pub listen_s: f64,
     /// Speed below which the spindle counts as standing, rpm, up to 1000 (default 1).
     pub standstill_rpm: f64,
@@ -52,16 +52,16 @@ pub struct InertiaConfig {
     pub saturation_nm: f64,
     /// Largest |torque| allowed, N·m (default: not watched).
     pub torque_bound_nm: f64,
-    /// Largest |command - speed| allowed, rpm (default: a quarter of `speed_high_rpm`).
+    /// Largest |command - speed| allowed, 0.001 to 400000 rpm (default: a quarter of `speed_high_rpm`).
     pub lag_limit_rpm: f64,
-    /// Rated torque, N·m. Required for `GIB_TORQUE_PERMILLE`.
+    /// Rated torque, 1e-6 to 1e6 N·m. Required for `GIB_TORQUE_PERMILLE`.
     pub rated_torque_nm: f64,
-    /// Torque constant, N·m/A. Required for `GIB_TORQUE_AMPERE`.
+    /// Torque constant, 1e-9 to 1e6 N·m/A. Required for `GIB_TORQUE_AMPERE`.
     pub torque_constant_nm_a: f64,
     /// The machine's own inertia (spindle, rotor, chuck), kg·m²; taken off, so that the value belongs to the workpiece
     /// and travels to another machine (default 0: nothing is taken off).
     pub own_inertia_kg_m2: f64,
-    /// Its expanded uncertainty (k = 2), kg·m².
+    /// Its expanded uncertainty (k = 2), 0 (default) to 1e6 kg·m².
     pub own_uncertainty_kg_m2: f64,
     /// Expanded uncertainty wanted, as a share of the total inertia, 0.001 to 0.25 (default 0.05). The report says
     /// which ramp would reach it.

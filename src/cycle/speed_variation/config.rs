@@ -24,33 +24,34 @@ pub struct SpeedVariationConfig {
     pub reserved: i32,
     /// Servo period, 0.00005 to 0.02 s. Required to start.
     pub cycle_s: f64,
-    /// Mean spindle speed, rpm; negative turns the other way. Required.
+    /// Mean spindle speed, rpm, |speed| from `speed_min_rpm` (0.001 at least) to `speed_max_rpm`; negative turns the other way.
+    /// Required.
     pub speed_rpm: f64,
-    /// Amplitude as a share of the mean speed, above 0 and below 1 (0.1 is ±10 %). Required to start.
+    /// Amplitude as a share of the mean speed, 0.000001 to 0.999 (0.1 is ±10 %). Required to start.
     pub amplitude_ratio: f64,
-    /// Period of the variation, 0.02 to 600 s. Required to start.
+    /// Period of the variation, 0.02 s and 8 cycles to 600 s. Required to start.
     pub period_s: f64,
-    /// Inertia of workpiece and chuck, kg·m²: measured, or `INA` from the program's head. Required.
+    /// Inertia of workpiece and chuck, 1e-9 to 1e6 kg·m²: measured, or `INA` from the program's head. Required.
     pub inertia_kg_m2: f64,
-    /// The machine's own inertia (spindle, rotor), kg·m², added to it.
+    /// The machine's own inertia (spindle, rotor), 0 (default) to 1e6 kg·m², added to it.
     pub own_inertia_kg_m2: f64,
-    /// Largest power of the motor, W. Required.
+    /// Largest power of the motor, 0.001 to 1e9 W. Required.
     pub power_w: f64,
-    /// Largest torque of the motor at the spindle, N·m (default: only the power limits).
+    /// Largest torque of the motor at the spindle, N·m, from 1e-6 (default: only the power limits).
     pub torque_nm: f64,
-    /// Highest speed allowed, rpm (default 200000).
+    /// Highest speed allowed, 0.001 to 200000 rpm (default 200000).
     pub speed_max_rpm: f64,
-    /// Lowest speed allowed, rpm (default 0).
+    /// Lowest speed allowed, 0 (default) to `speed_max_rpm`, rpm.
     pub speed_min_rpm: f64,
-    /// Coulomb friction of the spindle, N·m.
+    /// Coulomb friction of the spindle, 0 (default) to 1e6 N·m.
     pub coulomb_nm: f64,
-    /// Viscous friction of the spindle, N·m·s/rad.
+    /// Viscous friction of the spindle, 0 (default) to 1e6 N·m·s/rad.
     pub viscous_nm_s: f64,
-    /// Torque that cutting uses, N·m.
+    /// Torque that cutting uses, 0 (default) to 1e6 N·m.
     pub cutting_nm: f64,
-    /// Share of torque and power to keep back, 0 to 0.9.
+    /// Share of torque and power to keep back, 0 (default) to 0.9.
     pub reserve_ratio: f64,
-    /// Frequency of the chatter to be broken up, Hz; for the recommended values only (default: not known).
+    /// Frequency of the chatter to be broken up, up to 100000 Hz; for the recommended values only (default: not known).
     pub chatter_hz: f64,
 }
 

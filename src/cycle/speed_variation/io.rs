@@ -18,13 +18,14 @@ pub const GIB_SPEED_VARIATION_STOP: u32 = 8;
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SpeedVariationInput {
-    /// Mean spindle speed, rpm, with override; in the sense of the configuration.
+    /// Mean spindle speed, rpm, with override; within the configuration's limits and in its sense, else
+    /// GIB_ERR_SPEED_VARIATION_SPEED ends the variation.
     pub speed_rpm: f64,
-    /// Amplitude as a share of the mean speed; 0: as configured.
+    /// Amplitude as a share of the mean speed, up to 0.999; 0: as configured.
     pub amplitude_ratio: f64,
-    /// Period, s; 0: as configured.
+    /// Period, 0.02 s and 8 cycles to 600 s; 0: as configured.
     pub period_s: f64,
-    /// Torque that cutting uses now, N·m; the configuration's holds where that is more.
+    /// Torque that cutting uses now, 0 to 1e6 N·m; the configuration's holds where that is more.
     pub cutting_nm: f64,
     /// `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`, `GIB_SPEED_VARIATION_STOP`; other bits must be 0.
     pub flags: u32,
