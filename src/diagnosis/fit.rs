@@ -12,6 +12,7 @@ pub use slopes::Slope;
 use super::causes::{Law, Rest, Term, Trace};
 use super::frame::Frame;
 use super::many::{add, dot};
+use crate::machine::Effect;
 use crate::plant::linear::decomposed;
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -313,6 +314,12 @@ impl Fit {
     #[must_use]
     pub fn figure(&self) -> f64 {
         figure(&self.channels())
+    }
+
+    /// The effects that the parts stand for; none for a part beyond its physical bounds.
+    pub fn effects(&self, frame: &Frame) -> impl Iterator<Item = Effect> {
+        let pairs = self.parts.iter().zip(&self.coefficients);
+        pairs.filter_map(|(part, c)| (part.law.effect)(frame, &part.shape, c))
     }
 
     /// Number of fitted numbers.

@@ -14,7 +14,8 @@ use super::progress::{Stopped, Watch};
 use super::select::Selection;
 use super::show::{self, Coordinate};
 use super::verdict::Verdict;
-use crate::machine::{Axis, Cause};
+use crate::machine::{Axis, Cause, Effect};
+use crate::plant::physics::LEAST_SLOPE;
 
 /// Excess over the noise floor (in variance) below which a belief holds.
 const TOLERABLE_EXCESS: f64 = 0.6;
@@ -82,14 +83,17 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             let mut gains = self.held_out.gains(without.as_ref(), errors.as_ref());
             gains.retain(|gain| gain.channel != "table_position");
             gains.extend(gain::of_stretch(without.as_ref(), errors.as_ref()));
-            if is_idle(&gains) {
+            // Below the noise floor there is nothing but what the encoder makes, which drives the simulation too.
+            let nothing_left = less.channels().iter().all(|square| *square <= 1.0);
+            if nothing_left || is_idle(&gains) {
                 (found.fit, errors) = (less, without);
                 let Some(still) = self.explains(&found.fit) else { return Ok(self.nothing(&found)) };
                 verdict = still;
             }
         }
         let gains = self.held_out.gains(self.believed.as_ref(), errors.as_ref());
-        if !refuted(&gains) {
+        let effects: Vec<Effect> = found.fit.effects(self.bench.frame).collect();
+        if !refuted(&gains, &effects) {
             return Ok(Judged { verdict, selection: found, gains, refutation: None });
         }
         let causes = found.fit.parts.iter().map(|p| p.law.cause);
@@ -159,11 +163,16 @@ fn is_another_curve(bench: &Bench, empty: &Fit, fit: &Fit) -> bool {
 
 /// Whether a machine is no better than the belief: worse in torque and motor position together, and surely so in one of them
 /// or surely better in none. The simulated table carries the motor's error along, with which what the table does may happen to
-/// go.
+/// go. A motor that delivers nothing beyond a level cannot say by its motion how far beyond it was driven: no better torque can
+/// be asked of its machine.
 #[must_use]
-pub fn refuted(gains: &[Gain]) -> bool {
-    let motor = || gains.iter().filter(|gain| gain.channel != "table_position");
-    let surely_better = gains.iter().any(|gain| gain.ci95[0] > 1.0);
+pub fn refuted(gains: &[Gain], causes: &[Effect]) -> bool {
+    let silent =
+        |cause: &Effect| matches!(cause, Effect::TorqueSaturation { slope_ratio, .. } if *slope_ratio < LEAST_SLOPE);
+    let silent = causes.iter().any(silent);
+    let motor =
+        || gains.iter().filter(|gain| gain.channel == "position" || !silent && gain.channel != "table_position");
+    let surely_better = silent || gains.iter().any(|gain| gain.ci95[0] > 1.0);
     let surely_worse = motor().any(|gain| gain.ci95[1] < 1.0);
     motor().map(|gain| (gain.before / gain.after).ln()).sum::<f64>() < 0.0 && (surely_worse || !surely_better)
 }
@@ -172,7 +181,7 @@ pub fn refuted(gains: &[Gain]) -> bool {
 /// gains in the balance is none of the machine's.
 fn is_idle(gains: &[Gain]) -> bool {
     let better = |gain: &Gain| gain.ci95[0] > 1.0 && gain.before > LEAST_RATIO * gain.after;
-    !gains.is_empty() && !gains.iter().any(better) || refuted(gains)
+    !gains.is_empty() && !gains.iter().any(better) || refuted(gains, &[])
 }
 
 /// Says what imitates a law that has no name.
@@ -228,4 +237,20 @@ impl Excess {
 #[must_use]
 pub fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motor_that_delivers_nothing_beyond_its_limit_is_not_refuted_by_torque() {
+        let gain =
+            |channel, ratio: f64| Gain { channel, before: ratio, after: 1.0, ci95: [0.99 * ratio, 1.01 * ratio] };
+        let saturation = |slope_ratio| [Effect::TorqueSaturation { limit: 4.0, slope_ratio }];
+        let (worse, better) = (gain("torque", 0.9), gain("torque", 1.1));
+        assert!(refuted(std::slice::from_ref(&worse), &saturation(0.3)) && !refuted(&[better], &saturation(0.3)));
+        assert!(!refuted(std::slice::from_ref(&worse), &saturation(0.0)));
+        assert!(refuted(&[worse, gain("position", 0.9)], &saturation(0.0)));
+    }
 }

@@ -161,7 +161,8 @@ fn answer(recorded: &Recorded, frame: &Frame, mut notes: Vec<String>) -> Result<
             Ok((note, Some(observed))) => {
                 notes.extend(note.iter().map(|note| format!("hold-out: {note}")));
                 judged.gains = gain::on_holdout(axis, &extended, &observed, watch)?;
-                if refuted(&judged.gains) {
+                let effects: Vec<Effect> = findings.iter().map(|f| f.effect).collect();
+                if refuted(&judged.gains, &effects) {
                     let causes = findings.iter().map(|f| f.effect.cause());
                     notes.push(refutation(causes, &judged.gains, "the hold-out"));
                     judged = judge.nothing(&judged.selection);

@@ -9,6 +9,9 @@
 use crate::machine::{Axis, Effect, TwoMasses};
 use std::f64::consts::TAU;
 
+/// Least share of the current beyond a motor's limit that must be delivered for the current to be told from the torque.
+pub const LEAST_SLOPE: f64 = 0.02;
+
 /// A sine in position or time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ripple {
@@ -238,7 +241,7 @@ impl Physics {
     pub fn indicated(&self, torque: f64) -> f64 {
         match self.saturation {
             Some((limit, slope)) if torque.abs() > limit => {
-                let excess = if slope > 0.02 { (torque.abs() - limit) / slope } else { 0.0 };
+                let excess = if slope > LEAST_SLOPE { (torque.abs() - limit) / slope } else { 0.0 };
                 torque.signum() * (limit + excess)
             }
             _ => torque,
