@@ -84,8 +84,8 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             gains.retain(|gain| gain.channel != "table_position");
             gains.extend(gain::of_stretch(without.as_ref(), errors.as_ref()));
             // Below the noise floor there is nothing but what the encoder makes, which drives the simulation too.
-            let nothing_left = less.channels().iter().all(|square| *square <= 1.0);
-            if nothing_left || is_idle(&gains) {
+            let left = Excess::of(self.bench, &less, &found.fit).largest();
+            if left <= 0.0 || is_idle(&gains) {
                 (found.fit, errors) = (less, without);
                 let Some(still) = self.explains(&found.fit) else { return Ok(self.nothing(&found)) };
                 verdict = still;
