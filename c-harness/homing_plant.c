@@ -208,6 +208,9 @@ static double encoder(homing_plant *p, homing_plant_side *s)
 static double torque_reading(homing_plant *p, homing_plant_side *s)
 {
     double t = s->torque + p->c.torque_noise_nm * normal(&p->random);
+    if (p->c.torque_grid_nm > 0.0) {
+        t = p->c.torque_grid_nm * round(t / p->c.torque_grid_nm);
+    }
     switch (p->fault) {
     case FAULT_TORQUE_STUCK:
     case FAULT_TORQUE_STUCK_HIGH: return s->stuck_at;

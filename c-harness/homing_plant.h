@@ -30,6 +30,7 @@ typedef struct {
     double position_gain_1_s, velocity_gain_nm_s_mm, velocity_integral_time_s, velocity_feedforward;
     double torque_time_constant_s, torque_limit_nm;                /* the drive's own limit */
     double encoder_mm, torque_noise_nm;
+    double torque_grid_nm; /* steps of what the drive reports; 0: none */
     double torque_unit_nm; /* of what the drive reports; negative: with its sign turned; 0: 1 */
     int answer_cycles; /* that the kernel takes to carry a request out */
     uint64_t seed;

@@ -97,6 +97,43 @@ static void every_fault_is_named_and_safe(void **state)
     }
 }
 
+/* A torque in steps and without noise stands still at the drive's limit: held there, the axis has met a tight spot or a stop, and
+ * no stuck torque. A torque that is stuck is still named so. */
+static void a_torque_without_noise_is_not_stuck(void **state)
+{
+    (void)state;
+    static homing_world w, copy;
+    int tight = 0, stuck = 0, held = 0;
+    for (size_t i = 0; i < 2; i++) {
+        begin(&w, &VARIANTS[i]);
+        gib_homing_config g = w.config;
+        homing_plant_config c = w.plant.c;
+        c.torque_noise_nm = 0.0;
+        c.torque_grid_nm = 0.05;
+        assert_int_equal(homing_world_start(&w, &c, &g), GIB_OK);
+        while (w.status == GIB_BUSY) {
+            homing_world_step(&w);
+            if (w.status != GIB_BUSY || w.cycles % 23 != 5) {
+                continue;
+            }
+            memcpy(&copy, &w, sizeof copy);
+            homing_branch b = homing_world_break(&copy, FAULT_TIGHT_SPOT);
+            held += b.status != GIB_DONE;
+            if (!b.safe || b.status == GIB_ERR_HOMING_TORQUE_STUCK) {
+                fail_msg("variant %zu, cycle %d: status %d, %s", i, w.cycles, b.status, b.unsafe ? b.unsafe : "not stuck");
+            }
+            tight += b.status == GIB_ERR_HOMING_TIGHT_SPOT;
+            memcpy(&copy, &w, sizeof copy);
+            b = homing_world_break(&copy, FAULT_TORQUE_STUCK);
+            assert_true(b.safe);
+            stuck += b.status == GIB_ERR_HOMING_TORQUE_STUCK;
+        }
+        assert_int_equal(w.status, GIB_DONE);
+    }
+    printf("held %d times, %d named a tight spot; stuck %d times\n", held, tight, stuck);
+    assert_true(tight > held / 2 && stuck > held / 2);
+}
+
 /* Out at once after contact, with a restore that nobody acknowledges: meanwhile no torque winds up against the stop. */
 static void no_torque_while_the_restore_is_waited_for(void **state)
 {
@@ -219,6 +256,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(aborted_at_every_cycle),
         cmocka_unit_test(every_fault_is_named_and_safe),
+        cmocka_unit_test(a_torque_without_noise_is_not_stuck),
         cmocka_unit_test(no_torque_while_the_restore_is_waited_for),
         cmocka_unit_test(the_judge_sees_what_is_unsafe),
         cmocka_unit_test(calls_in_the_wrong_order),

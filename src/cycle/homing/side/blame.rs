@@ -146,7 +146,9 @@ impl Side {
             fault(GIB_ERR_HOMING_TORQUE_STUCK, "torque\0", self.reading, plan.release)
         } else if stayed || above > high + 4.0 * FILTERED * self.noise() {
             // A stop pushes the axis back; a tight spot takes as much torque above what sliding takes both ways.
-            let code = if self.stuck(plan) { GIB_ERR_HOMING_TORQUE_STUCK } else { GIB_ERR_HOMING_TIGHT_SPOT };
+            // A torque that pulls hard now pushed before: it is alive, though it stands at the drive's limit without noise.
+            let dead = self.stuck(plan) && self.lowest > -0.5 * plan.threshold;
+            let code = if dead { GIB_ERR_HOMING_TORQUE_STUCK } else { GIB_ERR_HOMING_TIGHT_SPOT };
             fault(code, "torque\0", -self.lowest, plan.limit)
         } else {
             None
@@ -170,8 +172,10 @@ impl Side {
     #[must_use]
     pub fn pressed_at_once(&self, plan: &Plan) -> Option<Fault> {
         let (way, field, low) = ((self.position - self.origin).abs(), "retract_mm\0", 0.5 * plan.retract);
+        // A torque that changed until the axis stood is alive, though it stands at the drive's limit without noise.
+        let on = (self.position - self.changed_at).abs() > plan.standing_way;
         let code = match () {
-            () if self.same >= plan.hold => GIB_ERR_HOMING_TORQUE_STUCK,
+            () if self.same >= plan.hold && on => GIB_ERR_HOMING_TORQUE_STUCK,
             () if way < 0.1 * low => GIB_ERR_HOMING_ENCODER,
             () => GIB_ERR_HOMING_TOUCHES,
         };
