@@ -7,6 +7,7 @@ use super::progress::{Stopped, Watch};
 use crate::machine::{Axis, Effect};
 use crate::plant::closed_loop::predict;
 use crate::plant::observed::Observed;
+use crate::plant::predict::{TorquePrediction, predict_torque};
 
 /// RMS before and after, on rows that were not fitted.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,15 +31,18 @@ fn errors(axis: &Axis, observed: &Observed) -> Option<Errors> {
     let less =
         |measured: &[f64], model: &[f64]| -> Vec<f64> { measured.iter().zip(model).map(|(m, p)| m - p).collect() };
     let replayed = prediction.closed_loop.as_ref();
-    let standing = observed.motion.standing_speed();
-    let mut torque = less(&observed.torque, &prediction.torque.torque);
-    let speeds = torque.iter_mut().zip(&observed.motion.velocity);
-    speeds.filter(|(_, v)| !(v.abs() > standing)).for_each(|(error, _)| *error = f64::NAN);
     Some([
-        Some(torque),
+        Some(torque_errors(observed, &prediction.torque)),
         replayed.map(|r| less(&observed.position, &r.position)),
         replayed.zip(observed.table_position.as_ref()).map(|(r, t)| less(t, &r.table_position)),
     ])
+}
+
+/// Errors of the torque; NaN where the axis stands.
+fn torque_errors(observed: &Observed, prediction: &TorquePrediction) -> Vec<f64> {
+    let standing = observed.motion.standing_speed();
+    let rows = observed.torque.iter().zip(&prediction.torque).zip(&observed.motion.velocity);
+    rows.map(|((measured, predicted), v)| if v.abs() > standing { measured - predicted } else { f64::NAN }).collect()
 }
 
 /// The gains on a recording that was not fitted.
@@ -96,6 +100,16 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
         })))
     }
 
+    /// RMS of the torque while the axis moves, by a machine with this set of causes.
+    #[must_use]
+    pub fn torque_error(&self, fit: &Fit) -> Option<f64> {
+        let observed = self.observed.as_ref()?;
+        let prediction = predict_torque(&fitted_without(self.axis, self.bench, fit, NEITHER), observed).ok()?;
+        let moving = torque_errors(observed, &prediction);
+        let (sum, count) = moving.iter().filter(|e| e.is_finite()).fold((0.0, 0.0), |(s, n), e| (s + e * e, n + 1.0));
+        (count > 0.0).then(|| f64::sqrt(sum / count))
+    }
+
     /// The gains of one set of causes over another by their errors.
     #[must_use]
     pub fn gains(&self, before: Option<&Errors>, after: Option<&Errors>) -> Vec<Gain> {
@@ -115,6 +129,9 @@ fn fitted_without(axis: &Axis, bench: &Bench, fit: &Fit, half: usize) -> Axis {
     belief::extended(axis, &effects)
 }
 
+/// Rows of neither half.
+const NEITHER: usize = 2;
+
 /// The half that a block belongs to, by the sequence of Thue and Morse: blocks that alternate might fall in step with moves
 /// that repeat, and each half would lack what the other is judged on.
 fn half_of(block: usize) -> usize {
@@ -132,7 +149,7 @@ fn half_of_rows(bench: &Bench, time_s: &[f64]) -> Vec<usize> {
         while block + 2 < frame.blocks.len() && t >= begin(block + 1) {
             block += 1;
         }
-        if t < begin(0) || t > last { 2 } else { half_of(block) }
+        if t < begin(0) || t > last { NEITHER } else { half_of(block) }
     };
     time_s.iter().map(of).collect()
 }

@@ -6,6 +6,7 @@
 //! that were held out worse than the belief: laws that lean on each other, or on the noise of the encoder that they are
 //! driven by, may explain what was measured and yet make a wrong machine.
 
+use super::contact;
 use super::fit::{Bench, Fit};
 use super::foreign;
 use super::frame::Columns;
@@ -24,7 +25,7 @@ const LEAST_EXPLAINED: f64 = 0.8;
 /// The same for lost motion: rigid flanks that meet without rebound place a clearance well, but not each impact.
 const LEAST_EXPLAINED_LOST_MOTION: f64 = 0.4;
 /// Excess (in variance) that may be left for everything to count as explained.
-const LITTLE_LEFT: f64 = 0.5;
+pub const LITTLE_LEFT: f64 = 0.5;
 
 /// Share of what is explained above which it is mostly a curve over one coordinate.
 const MOSTLY: f64 = 2.0 / 3.0;
@@ -77,6 +78,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         if let Some(goes) = foreign::stands_for(self.bench, &self.empty, &found.fit, self.watch)? {
             return Ok(Judged { refutation: Some(imitation(&found.fit, goes)), ..self.nothing(&found) });
         }
+        found = contact::settled(self.bench, &self.held_out, found, self.watch)?;
         let mut errors = self.held_out.errors(&found.fit)?;
         if let Some(less) = self.without_spring(&found.fit) {
             let without = if less.parts.is_empty() { self.believed.clone() } else { self.held_out.errors(&less)? };
@@ -86,7 +88,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             // Below the noise floor there is nothing but what the encoder makes, which drives the simulation too.
             let left = Excess::of(self.bench, &less, &found.fit).largest();
             if left <= 0.0 || is_idle(&gains) {
-                (found.fit, errors) = (less, without);
+                (found.fit, found.alike, errors) = (less, Vec::new(), without);
                 let Some(still) = self.explains(&found.fit) else { return Ok(self.nothing(&found)) };
                 verdict = still;
             }
@@ -118,7 +120,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let unknown = before.largest() > TOLERABLE_EXCESS;
         Judged {
             verdict: if unknown { Verdict::UnknownCause } else { Verdict::NoDiscrepancy },
-            selection: Selection { fit: self.empty.clone(), rivals: Vec::new() },
+            selection: Selection { fit: self.empty.clone(), rivals: Vec::new(), alike: Vec::new() },
             gains: self.held_out.gains(self.believed.as_ref(), self.believed.as_ref()),
             refutation: None,
         }

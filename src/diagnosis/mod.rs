@@ -13,6 +13,7 @@ mod blocks;
 pub mod causes;
 mod choice;
 mod columns;
+mod contact;
 pub mod experiment;
 pub mod filter;
 pub mod fit;

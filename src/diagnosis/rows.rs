@@ -1,6 +1,7 @@
 //! Where an axis rests, which way it slides, and which rows of a recording can be judged.
 
 use super::frame::Columns;
+use std::ops::Range;
 
 /// Most rows on which causes are compared; more are thinned evenly, which costs time and gains nothing.
 const MOST_KEPT: usize = 12_000;
@@ -74,12 +75,27 @@ pub fn doubtful_rows(columns: &Columns, resting: Vec<bool>, resolution: f64) -> 
     doubt
 }
 
+/// Share of the stroke that an axis travels before it has forgotten where it stood: which flank the table touched, if any, and which
+/// way friction was wound up when a stretch began, nobody knows.
+const FORGOTTEN: f64 = 1e-3;
+/// And time, s, until flanks that met on the way have come to rest.
+const SETTLED_S: f64 = 0.01;
+
+/// The first row of a stretch that depends on nothing before it.
+fn first_known(columns: &Columns, stretch: &Range<usize>, stroke: f64) -> usize {
+    let x = &columns.position;
+    let away = stretch.clone().find(|&i| (x[i] - x[stretch.start]).abs() > FORGOTTEN * stroke).unwrap_or(stretch.end);
+    away + (SETTLED_S / columns.period_s).ceil() as usize
+}
+
 /// Rows away from the ends of their stretch, thinned to the filter's own density, that carry weight.
 pub fn judged_rows(columns: &Columns, margin: usize, stride: usize, carries: impl Fn(usize) -> bool) -> Vec<usize> {
     let mut kept = Vec::new();
+    let (low, high) = columns.position.iter().fold((f64::MAX, f64::MIN), |(lo, hi), x| (x.min(lo), x.max(hi)));
     for s in &columns.stretches {
         if s.len() > 4 * margin {
-            kept.extend((s.start + margin..s.end - margin).step_by(stride).filter(|&row| carries(row)));
+            let begin = first_known(columns, s, high - low);
+            kept.extend((begin + margin..s.end - margin).step_by(stride).filter(|&row| carries(row)));
         }
     }
     let thin = kept.len().div_ceil(MOST_KEPT).max(1);

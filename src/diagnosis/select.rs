@@ -57,6 +57,8 @@ pub struct Selection {
     pub fit: Fit,
     /// Other sets of as many causes, best first.
     pub rivals: Vec<Fit>,
+    /// Other fits of the same causes that leave about as much.
+    pub alike: Vec<Fit>,
 }
 
 /// The numbers of a belief that a search may leave open from the start: the balance is linear in them.
@@ -155,7 +157,7 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     let start = if price(&open) < price(&start) { open } else { start };
     let fit = shrink(search.bench, start, search.watch)?;
     rivals.retain(|r| r.parts.len() == fit.parts.len() && !same_causes(r, &fit));
-    Ok(Selection { fit, rivals })
+    Ok(Selection { fit, rivals, alike: Vec::new() })
 }
 
 /// What a set of causes costs: its figure, and its numbers.
@@ -269,7 +271,9 @@ fn may_join(set: &Fit, law: &Law) -> bool {
     same == 0 || law.cause.row().repeatable && same < 2 && law.cause != Cause::PositionDependentFriction
 }
 
-fn is_physical(bench: &Bench, fit: &Fit) -> bool {
+/// Whether every part lies within its bounds, and ripples of few periods are there once.
+#[must_use]
+pub fn is_physical(bench: &Bench, fit: &Fit) -> bool {
     let few = fit.parts.iter().filter(|p| few_periods(p)).map(|p| p.law.cause);
     let mut few: Vec<Cause> = few.collect();
     few.sort();

@@ -256,6 +256,7 @@ fn what_is_missing(frame: &Frame) -> Vec<String> {
 fn findings(axis: &Axis, bench: &Bench, selection: &Selection, empty: &Fit) -> Vec<Finding> {
     let fit = &selection.fit;
     let mut effects = uncertainty::effects(bench, fit);
+    uncertainty::widen(bench, &mut effects, &selection.alike);
     belief::reconcile(bench.frame.axis, effects.iter_mut().flatten().map(|(effect, _)| effect));
     let total = 1.0 - (fit.squares() / empty.squares()).min(1.0);
     let drops: Vec<f64> = (0..fit.parts.len())

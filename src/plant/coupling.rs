@@ -2,6 +2,11 @@
 //!
 //! τ = k·(δ − c/2) + d·δ̇ beyond +c/2, mirrored beyond −c/2, nothing between; flanks push and never pull, so damping
 //! cannot turn the sign. Without clearance it is the plain spring. δ = motor − table in the motor's coordinate.
+//!
+//! A motor that moves as measured is no wall. Flanks that meet swing faster than rows follow, and the motor gives way between
+//! the rows: by z, with z̈ = −(τ − τ̄)/J₁ − 2·ζ·Ω·ż − Ω²·z, τ̄' = Ω·(τ − τ̄). What is slower than Ω is in the rows already.
+//! Behind a wall the flanks would throw the table back too fast and too often: the two masses swing at √(k/J₁ + k/J₂), a table
+//! before a wall at √(k/J₂) and with less damping.
 
 use crate::machine::TwoMasses;
 
@@ -18,6 +23,39 @@ pub fn transmitted(masses: &TwoMasses, wind: f64, rate: f64) -> f64 {
     }
     let outward = rate * wind.signum();
     (masses.stiffness * beyond + masses.damping * outward).max(0.0).copysign(wind)
+}
+
+/// How a motor between the rows gives way to the flanks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Giving {
+    /// Seconds times Ω, and times Ω².
+    corner: f64,
+    square: f64,
+    /// What damping leaves of the speed in a step.
+    kept: f64,
+    h: f64,
+}
+
+/// Ω times the time between two rows: a path through rows follows what swings slower. On 80 random clearances what the true
+/// machine leaves is least from 1.5 to 2.5, and clearances fitted with a larger one are less biased.
+const CORNER: f64 = 2.5;
+
+impl Giving {
+    /// In steps of `h` between rows that are so far apart, s.
+    #[must_use]
+    pub fn new(row_period_s: f64, h: f64) -> Self {
+        let corner = (CORNER / row_period_s).min(1.0 / h);
+        Self { corner: h * corner, square: h * corner * corner, kept: 1.0 / (1.0 + 1.4 * h * corner), h }
+    }
+
+    /// z, ż and τ̄ after a step in which the link carries `torque`; `mobility` is the step over the motor's inertia.
+    #[must_use]
+    #[inline(always)]
+    pub fn step(&self, [z, speed, answered]: [f64; 3], torque: f64, mobility: f64) -> [f64; 3] {
+        let beyond = torque - answered;
+        let speed = self.kept * (speed - mobility * beyond - self.square * z);
+        [z + self.h * speed, speed, answered + self.corner * beyond]
+    }
 }
 
 /// Longest step at which the explicit spring is well resolved: a fifteenth of a radian of its fastest swing.

@@ -3,7 +3,7 @@
 pub mod added;
 pub mod axis;
 pub mod closed_loop;
-mod coupling;
+pub mod coupling;
 pub mod friction;
 pub mod lateness;
 pub mod linear;

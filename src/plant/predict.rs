@@ -10,7 +10,7 @@
 //! for that cycle and the motor followed with time constant τ, so the row is later than the smooth torque of the motion:
 //! see [`Lateness`].
 
-use super::coupling::{longest_step_s, transmitted};
+use super::coupling::{Giving, longest_step_s, transmitted};
 use super::friction::Friction;
 use super::lateness::Lateness;
 use super::linear::decomposed;
@@ -141,6 +141,7 @@ fn table_torque(physics: &Physics, masses: &TwoMasses, observed: &Observed, run:
     let share = masses.table_friction_share;
     let mut friction = Friction { stiffness: share * physics.bristle_stiffness().unwrap_or(0.0), force: 0.0 };
     let at = |i: usize| (motion.position[i] * scale, motion.velocity[i] * scale);
+    let mut recoil = [0.0; 3];
     let (mut q, mut w) = at(run.start);
     // A table in motion is already pushed by its motor.
     q -= if w == 0.0 { 0.0 } else { (0.5 * masses.clearance).copysign(w) };
@@ -152,14 +153,19 @@ fn table_torque(physics: &Physics, masses: &TwoMasses, observed: &Observed, run:
         let h = span / steps;
         let ((q0, w0), (q1, w1)) = (at(i), at(i + 1));
         let mut sum = 0.0;
+        let giving = Giving::new(span, h);
         for step in 0..steps as usize {
             let s = (step as f64 + 0.5) / steps;
             let (motor, speed) = hermite(q0, w0 * span, q1, w1 * span, s);
             let t = observed.time_s[i] - observed.time_s[0] + s * span;
             let middle = q + 0.5 * h * w;
             let (x, v) = (middle / scale, w / scale);
-            let through = transmitted(masses, motor - middle, speed / span - w);
+            let [give, giving_speed, _] = recoil;
+            let through = transmitted(masses, motor + give - middle, speed / span + giving_speed - w);
             sum += through;
+            if masses.clearance > 0.0 {
+                recoil = giving.step(recoil, through, h / masses.motor_inertia);
+            }
             let push = through - physics.load(x, v, t) - share * physics.slope_friction(w);
             let next = friction.step(
                 masses.table_inertia,

@@ -6,6 +6,7 @@
 //! motor goes along the cubic of its positions and speeds: a straight line would take (ω·h)²/12 off what swings at ω, which
 //! looks like another inertia. The motion is as the encoder shows it: what smooths it takes the impacts off, and the table's
 //! torque comes out too small.
+//! Before flanks that meet the motor gives way between its rows, as [`Giving`] says.
 //!
 //! While the link of a clearance is loaded one way, c = J₂·ẍ₁ + φ·(Tc·sign(ẋ₁) + Tv·ẋ₁) + T0 keeps one flank in contact, the
 //! table moves with the motor, and nothing need be simulated.
@@ -14,6 +15,7 @@ use super::*;
 use crate::diagnosis::many::widest;
 use crate::diagnosis::sampling::NUMEROV;
 use crate::machine::TwoMasses;
+use crate::plant::coupling::Giving;
 use std::cell::RefCell;
 use std::ops::Range;
 
@@ -60,6 +62,9 @@ fn lanes(value: impl Fn(usize) -> f64) -> Lanes {
 struct Tables<'a> {
     frame: &'a Frame<'a>,
     inertia: Lanes,
+    /// How the motor gives way.
+    giving: Giving,
+    motor_mobility: Lanes,
     /// Share of friction, its dry level and its viscous slope.
     share: Lanes,
     level: Lanes,
@@ -83,6 +88,8 @@ struct State {
     /// Rows since the flanks met last, while they stay together, and the way they push.
     together: [usize; LANES],
     side: Lanes,
+    /// How the motor has given way.
+    given: [Lanes; 3],
     /// Not known to move with the motor.
     loose: [bool; LANES],
 }
@@ -105,6 +112,8 @@ impl<'a> Tables<'a> {
         Self {
             frame,
             inertia: of(|m| m.table_inertia),
+            giving: Giving::new(frame.columns.period_s, h),
+            motor_mobility: of(|m| m.motor_inertia).map(|j| h / j),
             share,
             level: share.map(|s| s * b.coulomb),
             viscous: share.map(|s| s * b.viscous),
@@ -161,6 +170,7 @@ impl<'a> Tables<'a> {
             speed: [0.0; LANES],
             together: [0; LANES],
             side: [0.0; LANES],
+            given: [[0.0; LANES]; 3],
             loose: [false; LANES],
         };
         for i in rows.start..rows.end - 1 {
@@ -178,6 +188,7 @@ impl<'a> Tables<'a> {
                     state.position[l] = behind(l, motor, load[l]);
                     state.speed[l] = self.frame.raw_speed[i] * unit;
                     state.together[l] = 0;
+                    (state.given[0][l], state.given[1][l], state.given[2][l]) = (0.0, 0.0, load[l]);
                 }
                 state.loose[l] = !(firm && held);
                 any |= state.loose[l];
@@ -235,6 +246,7 @@ impl<'a> Tables<'a> {
         let kept = lanes(|l| 1.0 - mobility[l] * self.viscous[l]);
         let dry = lanes(|l| mobility[l] * self.level[l]);
         let (mut x, mut v) = (state.position, state.speed);
+        let [mut give, mut giving, mut answered] = state.given;
         let (mut sum, mut far, mut least) = ([0.0; LANES], [0.0; LANES], [f64::INFINITY; LANES]);
         for step in 0..self.steps {
             let s = (step as f64 + 0.5) * per_step;
@@ -242,10 +254,10 @@ impl<'a> Tables<'a> {
             let speed = (d0 + s * (2.0 * c2 + s * 3.0 * c3)) * per_span;
             for l in 0..LANES {
                 let middle = x[l] + half_step * v[l];
-                let wind = motor - middle;
+                let wind = motor - middle + if FLANKS { give[l] } else { 0.0 };
                 let push = if FLANKS {
                     // Flanks push and never pull.
-                    let outward = (speed - v[l]) * 1.0f64.copysign(wind);
+                    let outward = (speed + giving[l] - v[l]) * 1.0f64.copysign(wind);
                     let beyond = wind.abs() - self.half[l];
                     let spring = larger(self.stiffness[l] * beyond + self.damping[l] * outward, 0.0);
                     let push = if beyond > 0.0 { spring } else { 0.0 };
@@ -254,6 +266,10 @@ impl<'a> Tables<'a> {
                 } else {
                     self.stiffness[l] * wind + self.damping[l] * (speed - v[l])
                 };
+                if FLANKS {
+                    [give[l], giving[l], answered[l]] =
+                        self.giving.step([give[l], giving[l], answered[l]], push, self.motor_mobility[l]);
+                }
                 sum[l] += push;
                 far[l] += s * push;
                 // Dry friction takes what speed it can, and never turns it.
@@ -263,6 +279,7 @@ impl<'a> Tables<'a> {
             }
         }
         (state.position, state.speed, state.side) = (x, v, sum);
+        state.given = [give, giving, answered];
         for l in 0..LANES {
             state.together[l] = if least[l] > 0.0 { state.together[l] + 1 } else { 0 };
         }
