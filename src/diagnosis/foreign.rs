@@ -20,7 +20,7 @@ const FOR_AS_MANY: f64 = LEAST_GAIN;
 const PLACES: usize = 24;
 const HALVED: i32 = 5;
 /// Pieces of the time or of the stroke, each with a level of its own.
-const PIECES: usize = 48;
+const PIECES: usize = 24;
 
 /// What is said while it is done.
 const STAGE: &str = "comparing with laws without a name";

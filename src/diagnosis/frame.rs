@@ -95,7 +95,7 @@ pub struct Frame<'a> {
     torque: Vec<f64>,
     stroke: (f64, f64),
     /// What the encoder's grid makes in the balance beyond what [`Frame::floor`] sees in second differences, drive's own unit.
-    unseen: f64,
+    pub unseen: f64,
     /// Weights of the whole filter of what is smooth between rows, of the measured torque, and of the low-pass alone; odd.
     kernel: Vec<f64>,
     instant_kernel: Vec<f64>,

@@ -56,9 +56,24 @@ pub fn unseen_by_floor(frame: &Frame) -> f64 {
     (square - frame.floor(&made, true).powi(2)).max(0.0).sqrt()
 }
 
-/// A part in table − encoder that may well be the grids'; `without` are the fits without each part.
+/// A part that may well be the grids': one in table − encoder, or a ripple of the torque; `without` are the fits without each
+/// part.
 #[must_use]
 pub fn imitated(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
+    imitated_torque(bench, fit).or_else(|| imitated_table(bench, without, fit))
+}
+
+/// A ripple of the torque that is no larger than what the encoder's grid makes through the inertia.
+fn imitated_torque(bench: &Bench, fit: &Fit) -> Option<usize> {
+    let ripple = |i: &usize| [Cause::Cogging, Cause::ExternalVibration].contains(&fit.parts[*i].law.cause);
+    let least = SURELY * bench.frame.unseen / bench.floors[0];
+    (0..fit.parts.len()).filter(ripple).find(|&i| {
+        let own = &fit.contribution(i)[..bench.rows];
+        dot(own, own) < bench.rows as f64 * least * least
+    })
+}
+
+fn imitated_table(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
     let screw = |i: &usize| [Cause::ScrewPitchError, Cause::ScrewPeriodicError].contains(&fit.parts[*i].law.cause);
     (0..fit.parts.len()).filter(screw).find(|&i| {
         let less = &without[i];

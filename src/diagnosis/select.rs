@@ -8,9 +8,10 @@
 use super::approach::Approach;
 use super::blocks;
 use super::causes::Law;
-use super::causes::periods::{FEW, is_in_each_period};
+use super::causes::periods::{FEW, is_all_the_time, is_in_each_period};
 use super::fit::{Bench, Fit, Part, figure};
 use super::grids;
+use super::many::add;
 use super::progress::{Stopped, Watch};
 use super::uncertainty;
 use crate::machine::Cause;
@@ -46,6 +47,9 @@ const MOST_IN_A_BLOCK: f64 = 0.125;
 /// Least share of the variance that causes explain, found or believed, where a cause acts: a thirtieth in amplitude. No law
 /// holds more exactly on a machine.
 const LEAST_SHARE: f64 = 0.001;
+
+/// Beats in a recording below which two vibrations are one that comes and goes.
+const BEATS: f64 = 4.0;
 
 /// Least size of a cause in its standard deviations: it must be known to be there at all.
 const LEAST_STRENGTH: f64 = 2.5;
@@ -371,14 +375,31 @@ fn few_periods(part: &Part) -> bool {
     along_stroke && part.shape.first().is_some_and(|periods| *periods < FEW)
 }
 
-/// A ripple of few periods that is not there in each of them.
+/// A ripple of few periods that is not there in each of them, or a vibration that is not there all the time.
 fn once_only(bench: &Bench, fit: &Fit) -> Option<usize> {
     (0..fit.parts.len()).find(|&i| {
         let Part { law, shape, .. } = &fit.parts[i];
+        if law.cause == Cause::ExternalVibration {
+            return !is_all_the_time(bench.frame, &fit.contribution(i), &without_neighbours(fit, i));
+        }
         let channel = if law.cause == Cause::Cogging { 0..bench.rows } else { bench.rows..fit.residual.len() };
         few_periods(&fit.parts[i])
             && !is_in_each_period(bench.frame, shape[0], &fit.contribution(i)[channel.clone()], &fit.residual[channel])
     })
+}
+
+/// What is left when vibrations go that a recording of this length does not tell from one: two that beat are there only while
+/// they agree.
+fn without_neighbours(fit: &Fit, part: usize) -> Vec<f64> {
+    let mut left = fit.residual.clone();
+    let near = |other: &Part| {
+        let own = &fit.parts[part];
+        other.law.cause == own.law.cause && (other.shape[0] - own.shape[0]).abs() < BEATS
+    };
+    for other in (0..fit.parts.len()).filter(|&other| other != part && near(&fit.parts[other])) {
+        add(&mut left, 1.0, &fit.contribution(other));
+    }
+    left
 }
 
 /// Whether held-out blocks bear out what `full` gains over `less`.

@@ -173,6 +173,12 @@ pub fn flattened_at(values: &[f64], index: f64, share: f64) -> f64 {
     if share == 0.0 { at(0.0) } else { at(0.0) + share * (at(-1.0) - 2.0 * at(0.0) + at(1.0)) }
 }
 
+/// The share of a sine that a zero-phase cut-off leaves: a Butterworth filter of fourth order there and back.
+#[must_use]
+pub fn passed(hz: f64, cutoff_hz: f64) -> f64 {
+    1.0 / (1.0 + (hz / cutoff_hz).powi(8))
+}
+
 /// A regular series without what lies above a cut-off, unshifted: the band in which a [`Motion`] is known.
 #[must_use]
 pub fn smoothed(values: &[f64], period: f64, cutoff_hz: f64) -> Vec<f64> {

@@ -14,11 +14,12 @@ use super::coupling::{Giving, longest_step_s, transmitted};
 use super::friction::Friction;
 use super::lateness::Lateness;
 use super::linear::decomposed;
-use super::motion::{Motion, cubic_at, flattened_at, smoothed};
+use super::motion::{Motion, cubic_at, flattened_at, passed, smoothed};
 use super::observed::Observed;
 use super::physics::{Physics, Ripple};
 use crate::machine::{Axis, TwoMasses};
 use nalgebra::{DMatrix, DVector};
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// A predicted torque and what it took to predict it.
@@ -56,9 +57,11 @@ pub fn predict_torque(axis: &Axis, observed: &Observed) -> Result<TorquePredicti
     let mut torque = nothing();
     for run in &observed.runs {
         for i in run.clone() {
-            let (x, t) = (observed.motion.position[i], observed.time_s[i] - observed.time_s[0]);
-            let vibration: f64 = physics.vibration.iter().map(|ripple| ripple.at(t)).sum();
-            delivered[i] += physics.cogging_torque(x) + vibration;
+            let motion = &observed.motion;
+            let (x, v, t) = (motion.position[i], motion.velocity[i], observed.time_s[i] - observed.time_s[0]);
+            let cogging = physics.cogging.iter().map(|ripple| seen(ripple, v, motion) * ripple.at(x));
+            let vibration = physics.vibration.iter().map(|ripple| seen(ripple, 1.0, motion) * ripple.at(t));
+            delivered[i] += cogging.chain(vibration).sum::<f64>();
             delivered[i] = physics.indicated(delivered[i]).clamp(-axis.base.torque_limit, axis.base.torque_limit);
         }
         let part = &delivered[run.clone()];
@@ -68,6 +71,12 @@ pub fn predict_torque(axis: &Axis, observed: &Observed) -> Result<TorquePredicti
         }
     }
     Ok(TorquePrediction { torque, physics, phases_unknown })
+}
+
+/// The share of a ripple that is passed at a speed that the motor must deliver: above the cut-off of the motion the axis gives
+/// way to it, which is not seen, and where rows are far apart would stand for a slow one.
+fn seen(ripple: &Ripple, speed: f64, motion: &Motion) -> f64 {
+    passed(ripple.wave * speed.abs() / TAU, motion.cutoff_hz)
 }
 
 /// Torque that the motor must deliver, without ripples, for one run of rows.
@@ -229,8 +238,9 @@ fn set_phases(physics: &mut Physics, observed: &Observed, delivered: &[f64], shi
             continue;
         }
         column.push(Some(basis.len()));
-        basis.push(rows.iter().map(|&i| (ripple.wave * along(k, i)).sin()).collect());
-        basis.push(rows.iter().map(|&i| (ripple.wave * along(k, i)).cos()).collect());
+        let share = |i: usize| seen(ripple, if k < cogging { motion.velocity[i] } else { 1.0 }, motion);
+        basis.push(rows.iter().map(|&i| share(i) * (ripple.wave * along(k, i)).sin()).collect());
+        basis.push(rows.iter().map(|&i| share(i) * (ripple.wave * along(k, i)).cos()).collect());
     }
     let weights = least_squares(&basis, &residual);
     for (ripple, column) in ripples.into_iter().zip(column) {

@@ -71,21 +71,31 @@ pub fn ripple(frame: &Frame, periods: f64, [sine, cosine]: [f64; 2]) -> Option<(
     (periods > WHOLE).then(|| (f64::hypot(sine, cosine), (high - low) / periods))
 }
 
-/// Whether a ripple of few periods over the stroke is there in each of them (in each half of the stroke at least): at least
-/// half as large as on the whole, and half as much again at most. `ripple` and `left` are what it explains and what is left,
-/// at the judged rows. What happens once, as a detent, is explained by a wave of few periods as well, and is not there
-/// elsewhere.
+/// Whether a ripple of few periods over the stroke is there in each of them (in each half of the stroke at least). What happens
+/// once, as a detent, is explained by a wave of few periods as well, and is not there elsewhere.
 pub fn is_in_each_period(frame: &Frame, periods: f64, ripple: &[f64], left: &[f64]) -> bool {
     let count = periods.floor().clamp(2.0, FEW);
     let (low, high) = frame.stroke();
-    let mut sums = [[0.0f64; 3]; FEW as usize];
+    is_in_each(count, |row| (frame.x[row] - low) / (high - low), frame, ripple, left)
+}
+
+/// Whether a vibration is there in each eighth of the recording. What a single feed makes, as the encoder's grid does, ends
+/// with it.
+pub fn is_all_the_time(frame: &Frame, ripple: &[f64], left: &[f64]) -> bool {
+    let all = frame.seconds(frame.x.len() - 1);
+    is_in_each(8.0, |row| frame.seconds(row) / all, frame, ripple, left)
+}
+
+/// Whether a ripple is there in each of so many pieces of a way: at least half as large as on the whole, and half as much again at
+/// most. `ripple` and `left` are what it explains and what is left, at the judged rows.
+fn is_in_each(pieces: f64, along: impl Fn(usize) -> f64, frame: &Frame, ripple: &[f64], left: &[f64]) -> bool {
+    let mut sums = vec![[0.0f64; 3]; pieces as usize];
+    let last = sums.len() - 1;
     for ((&row, ripple), left) in frame.kept.iter().zip(ripple).zip(left) {
-        let place = (count * (frame.x[row] - low) / (high - low)) as usize;
-        if let Some([own, with, noise]) = sums.get_mut(place.min(count as usize - 1)) {
-            *own += ripple * ripple;
-            *with += ripple * left;
-            *noise += (ripple * left).powi(2);
-        }
+        let [own, with, noise] = &mut sums[((pieces * along(row)) as usize).min(last)];
+        *own += ripple * ripple;
+        *with += ripple * left;
+        *noise += (ripple * left).powi(2);
     }
     let whole: f64 = sums.iter().map(|s| s[0]).sum();
     sums.iter().filter(|s| s[0] > 0.02 * whole).all(|[own, with, noise]| {
