@@ -392,15 +392,23 @@ pub fn pseudo_inverse(matrix: DMatrix<f64>, least: f64) -> Option<DMatrix<f64>> 
 pub(super) fn orthonormal(column: &[f64], basis: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
     let mut c = column.to_vec();
     let mut weights = vec![0.0; basis.len() + 1];
+    let (whole, mut length) = (dot(column, column).sqrt(), f64::INFINITY);
+    // Taking off most of a column leaves rounding errors along the basis, which a second time takes off (Parlett 1980).
     for _ in 0..2 {
         for (direction, weight) in basis.iter().zip(&mut weights) {
             let along = dot(direction, &c);
-            add(&mut c, -along, direction);
-            *weight += along;
+            // Levels of different pieces have nothing in common.
+            if along != 0.0 {
+                add(&mut c, -along, direction);
+                *weight += along;
+            }
+        }
+        length = dot(&c, &c).sqrt();
+        if length > 0.7 * whole {
+            break;
         }
     }
-    let length = dot(&c, &c).sqrt();
-    if length > 1e-6 * dot(column, column).sqrt() && length > 0.0 {
+    if length > 1e-6 * whole && length > 0.0 {
         c.iter_mut().for_each(|c| *c /= length);
         weights[basis.len()] = length;
     } else {
