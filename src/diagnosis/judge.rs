@@ -12,7 +12,7 @@ use super::foreign;
 use super::frame::Columns;
 use super::gain::{self, Errors, Gain, HeldOut};
 use super::progress::{Stopped, Watch};
-use super::select::{Selection, beyond_bounds};
+use super::select::Selection;
 use super::show::{self, Coordinate};
 use super::verdict::Verdict;
 use crate::machine::{Axis, Cause, Effect};
@@ -126,7 +126,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         }
     }
 
-    /// How well a set of causes explains the excess; `None` where it does not, or there is no cause that can be named.
+    /// How well a set of causes explains the excess; `None` where it does not, or there is no cause.
     fn explains(&self, fit: &Fit) -> Option<Verdict> {
         let before = Excess::of(self.bench, &self.empty, fit);
         let after = Excess::of(self.bench, fit, fit);
@@ -134,8 +134,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let least = if lost_motion { LEAST_EXPLAINED_LOST_MOTION } else { LEAST_EXPLAINED };
         let too_little = before.largest() > TOLERABLE_EXCESS && before.explained_by(&after) < least;
         let much_left = after.largest() > LITTLE_LEFT;
-        let nameless = fit.parts.is_empty() || beyond_bounds(self.bench, fit).is_some();
-        if nameless || too_little || much_left && is_another_curve(self.bench, &self.empty, fit) {
+        if fit.parts.is_empty() || too_little || much_left && is_another_curve(self.bench, &self.empty, fit) {
             None
         } else if much_left {
             Some(Verdict::PartlyExplained)

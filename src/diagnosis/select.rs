@@ -282,14 +282,8 @@ pub fn is_physical(bench: &Bench, fit: &Fit) -> bool {
     let mut few: Vec<Cause> = few.collect();
     few.sort();
     let one_of_each = few.windows(2).all(|pair| pair[0] != pair[1]);
-    one_of_each && beyond_bounds(bench, fit).is_none()
-}
-
-/// The part whose parameters are beyond physical bounds.
-#[must_use]
-pub fn beyond_bounds(bench: &Bench, fit: &Fit) -> Option<usize> {
-    let mut parts = fit.parts.iter().zip(&fit.coefficients);
-    parts.position(|(p, c)| (p.law.effect)(bench.frame, &p.shape, c).is_none())
+    one_of_each
+        && fit.parts.iter().zip(&fit.coefficients).all(|(p, c)| (p.law.effect)(bench.frame, &p.shape, c).is_some())
 }
 
 /// Drops causes that the others do without as they are, weakest first: refined, the others would do without them all the more.
@@ -326,9 +320,7 @@ fn shrink(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
             break;
         };
         let needed = price(&without[weakest]) - price(&fit) >= LEAST_GAIN && borne_out(bench, &without[weakest], &fit);
-        let dropped = if let Some(beyond) = beyond_bounds(bench, &fit) {
-            Some(beyond)
-        } else if needed {
+        let dropped = if needed {
             slight(bench, &without, &fit)
                 .or_else(|| doubtful(bench, &without, &fit))
                 .or_else(|| once_only(bench, &fit))
