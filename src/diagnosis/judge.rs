@@ -126,7 +126,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         }
     }
 
-    /// How well a set of causes explains the excess; `None` where it does not, or there is no cause.
+    /// How well a set of causes explains the excess; `None` where it does not, or none of them can be named.
     fn explains(&self, fit: &Fit) -> Option<Verdict> {
         let before = Excess::of(self.bench, &self.empty, fit);
         let after = Excess::of(self.bench, fit, fit);
@@ -134,7 +134,8 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let least = if lost_motion { LEAST_EXPLAINED_LOST_MOTION } else { LEAST_EXPLAINED };
         let too_little = before.largest() > TOLERABLE_EXCESS && before.explained_by(&after) < least;
         let much_left = after.largest() > LITTLE_LEFT;
-        if fit.parts.is_empty() || too_little || much_left && is_another_curve(self.bench, &self.empty, fit) {
+        let nameless = fit.effects(self.bench.frame).next().is_none();
+        if nameless || too_little || much_left && is_another_curve(self.bench, &self.empty, fit) {
             None
         } else if much_left {
             Some(Verdict::PartlyExplained)

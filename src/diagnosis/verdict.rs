@@ -179,6 +179,7 @@ fn answer(recorded: &Recorded, frame: &Frame, mut notes: Vec<String>) -> Result<
         }
     }
     let Judged { verdict, selection: Selection { fit, .. }, gains, .. } = judged;
+    notes.extend(nameless(frame, &fit));
     let shown = show::views(&bench, &empty, &fit);
     let [rest, _] = bench.rest(&fit);
     let unexplained = Unexplained {
@@ -284,6 +285,19 @@ fn findings(axis: &Axis, bench: &Bench, selection: &Selection, empty: &Fit) -> V
     }
     list.sort_by(|a, b| b.share.total_cmp(&a.share));
     list
+}
+
+/// What is to be said of parts whose parameters no machine has: others were found beside them, and would not have been without.
+fn nameless(frame: &Frame, fit: &Fit) -> Option<String> {
+    let pairs = fit.parts.iter().zip(&fit.coefficients);
+    let beyond = pairs.filter(|(part, c)| (part.law.effect)(frame, &part.shape, c).is_none());
+    let causes: Vec<&str> = beyond.map(|(part, _)| part.law.cause.name()).collect();
+    (!causes.is_empty()).then(|| {
+        format!(
+            "beside what is named something looks like {}, but with parameters that no machine has: it is not named, and not in the extended machine",
+            causes.join(" and ")
+        )
+    })
 }
 
 /// Probability that the cause's gain is not chance: Student's t over blocks, as a normal's tail.

@@ -1,5 +1,5 @@
-//! Plots as SVG text, drawn by plotters: one or several panels below each other, each with title, units on its axes, lines,
-//! points, bands and a legend. Colours are those of Okabe and Ito, which people with any colour vision tell apart.
+//! Plots as SVG text, drawn by plotters: one or several panels below each other, many in two columns, each with title, units on
+//! its axes, lines, points, bands and a legend. Colours are those of Okabe and Ito, which people with any colour vision tell apart.
 
 use std::fmt;
 
@@ -95,26 +95,30 @@ impl fmt::Display for PlotError {
 
 impl std::error::Error for PlotError {}
 
-/// Width of a picture, and height of each of its panels, in pixels.
-const WIDTH: u32 = 960;
-const HEIGHT: u32 = 480;
+/// Width and height of a panel that has the picture's width to itself, in pixels.
+const WIDE: (u32, u32) = (960, 480);
+/// The same of one of two beside each other, and from how many panels they are.
+const NARROW: (u32, u32) = (720, 400);
+const MANY: usize = 4;
 const INK: RGBColor = RGBColor(40, 40, 40);
 const RULE: RGBColor = RGBColor(225, 225, 225);
 /// How much of its colour a band keeps.
 const BAND: f64 = 0.18;
 const FONT: &str = "Helvetica, Arial, sans-serif";
 
-/// Draws the panels below each other.
+/// Draws the panels below each other; many of them row by row in two columns.
 ///
 /// # Errors
 /// A panel without a finite point.
 pub fn svg(panels: &[Panel]) -> Result<String, PlotError> {
     let mut text = String::new();
     {
-        let height = HEIGHT * u32::try_from(panels.len()).unwrap_or(1).max(1);
-        let root = SVGBackend::with_string(&mut text, (WIDTH, height)).into_drawing_area();
+        let (columns, (width, height)) = if panels.len() < MANY { (1, WIDE) } else { (2, NARROW) };
+        let rows = panels.len().div_ceil(columns).max(1);
+        let size = (columns as u32 * width, u32::try_from(rows).unwrap_or(1) * height);
+        let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
         root.fill(&WHITE).map_err(failed)?;
-        for (panel, area) in panels.iter().zip(root.split_evenly((panels.len().max(1), 1))) {
+        for (panel, area) in panels.iter().zip(root.split_evenly((rows, columns))) {
             draw(panel, &area)?;
         }
         root.present().map_err(failed)?;

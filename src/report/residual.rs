@@ -3,12 +3,14 @@
 use super::plot::{Colour, Mark, Panel, PlotError, Series, svg};
 use crate::diagnosis::{Coordinate, Diagnosis, View};
 
-/// Draws the residual against every coordinate as SVG, one panel each.
+/// Draws the residual against every coordinate as SVG, one panel each, first those that most of it goes with.
 ///
 /// # Errors
 /// The diagnosis shows nothing: the recording did not suffice.
 pub fn picture(diagnosis: &Diagnosis) -> Result<String, PlotError> {
-    let panels: Vec<Panel> = diagnosis.shown.iter().map(|view| panel(diagnosis, view)).collect();
+    let mut views: Vec<&View> = diagnosis.shown.iter().collect();
+    views.sort_by(|a, b| b.before.total_cmp(&a.before));
+    let panels: Vec<Panel> = views.into_iter().map(|view| panel(diagnosis, view)).collect();
     svg(&panels)
 }
 
