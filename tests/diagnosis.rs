@@ -60,7 +60,7 @@ fn finds(cause: Cause, truth: &[f64], tolerance: f64, recording: &Recording) {
     }
     // The gain is real and not better than noise allows.
     let gain = &d.gains[0];
-    assert!(gain.after < gain.before && gain.after > 0.2 * d.unexplained.noise_rms, "{gain:?}");
+    assert!(gain.after < gain.before && gain.after > 0.2 * d.unexplained.torque.noise_rms, "{gain:?}");
 }
 
 #[test]
@@ -118,7 +118,7 @@ fn a_ripple_of_few_periods_over_the_stroke_is_found_and_a_single_swing_is_none()
     };
     let d = judged(&recording(detent));
     assert_eq!((d.verdict, d.findings.len()), (Verdict::UnknownCause, 0), "{d:?}");
-    assert!(d.unexplained.describes.contains("position"), "{}", d.unexplained.describes);
+    assert!(d.unexplained.torque.describes.contains("position"), "{}", d.unexplained.torque.describes);
 }
 
 #[test]
@@ -126,7 +126,7 @@ fn a_bump_of_friction_at_one_speed_is_no_sum_of_frictions() {
     let bump = |_: f64, _: f64, v: f64, _: f64| 0.4 * v.signum() * (-((v.abs() - 50.0) / 12.0).powi(2)).exp();
     let d = judged(&recording(bump));
     assert_eq!((d.verdict, d.findings.len()), (Verdict::UnknownCause, 0), "{d:?}");
-    assert!(d.unexplained.describes.contains("velocity"), "{}", d.unexplained.describes);
+    assert!(d.unexplained.torque.describes.contains("velocity"), "{}", d.unexplained.torque.describes);
 }
 
 /// There and back at 100 mm/s, where rows are 400 steps of the scale's grid apart and a little more: its error beats every
@@ -225,7 +225,11 @@ fn what_fits_nothing_is_called_unknown() {
     let level = |t: f64| if ((t * 0.37).sin() + (t * 0.83).sin()) > 0.2 { 0.25 } else { -0.25 };
     let d = judged(&recording(|t, _, _, _| level(t)));
     assert_eq!(d.verdict, Verdict::UnknownCause, "{:?}", d.findings);
-    assert!(d.findings.is_empty() && d.unexplained.describes.contains("lives in"), "{}", d.unexplained.describes);
+    assert!(
+        d.findings.is_empty() && d.unexplained.torque.describes.contains("lives in"),
+        "{}",
+        d.unexplained.torque.describes
+    );
 }
 
 #[test]

@@ -320,7 +320,7 @@ pub unsafe extern "C" fn gib_diagnosis_result(handle: *const GibDiagnosis, repor
             findings: diagnosis.findings.len() as u32,
             residual_before: gain.map_or(0.0, |gain| gain.before),
             residual_after: gain.map_or(0.0, |gain| gain.after),
-            noise: diagnosis.unexplained.noise_rms,
+            noise: diagnosis.unexplained.torque.noise_rms,
         };
         Ok(GIB_OK)
     })

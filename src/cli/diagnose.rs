@@ -7,8 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use gib::diagnosis::{Diagnosis, Verdict, axis_of, diagnose};
-use gib::machine::Drive;
+use gib::diagnosis::{Diagnosis, Left, Verdict, axis_of, diagnose};
 use gib::recording::Recording;
 
 use super::table::Table;
@@ -87,6 +86,7 @@ impl Diagnose {
 
 fn text(d: &Diagnosis) -> String {
     let unit = if d.extended.drive.is_linear() { "N" } else { "N·m" };
+    let load = if d.extended.drive.is_rotary() { (1.0, "°") } else { (1e3, "µm") };
     let mut text = String::new();
     let _ = writeln!(
         text,
@@ -131,7 +131,7 @@ fn text(d: &Diagnosis) -> String {
             .effect
             .keyed_values(d.extended.drive.is_linear())
             .zip(&finding.deviations)
-            .map(|((key, value), std)| format!("{key} {value:.5} ± {:.2}", Short(1.96 * std)))
+            .map(|((key, value), std)| format!("{key} {}", with_interval(value, 1.96 * std)))
             .collect();
         let _ = writeln!(text, "   {}", parameters.join(", "));
         for other in &finding.indistinguishable_from {
@@ -145,31 +145,50 @@ fn text(d: &Diagnosis) -> String {
         text.push('\n');
     }
     for gain in &d.gains {
-        let (factor, unit) = match (gain.channel.ends_with("position"), &d.extended.drive) {
-            (false, _) => (1.0, unit),
-            (true, Drive::Rotary { .. }) => (1.0, "°"),
-            (true, _) => (1e3, "µm"),
-        };
+        let (factor, unit) = if gain.channel.ends_with("position") { load } else { (1.0, unit) };
+        let (before, after) = (factor * gain.before, factor * gain.after);
         let _ = writeln!(
             text,
-            "{} error{} on rows not fitted: {:.4} → {:.4} {unit} RMS, {:.2} times better (95 %: {:.2} to {:.2})",
+            "{} error{} on rows not fitted: {} → {} {unit} RMS, {:.2} times better (95 %: {:.2} to {:.2})",
             gain.channel,
             if gain.channel.ends_with("position") { "" } else { " while moving," },
-            factor * gain.before,
-            factor * gain.after,
+            beside(before, after),
+            beside(after, before),
             gain.before / gain.after.max(1e-300),
             gain.ci95[0],
             gain.ci95[1]
         );
     }
     if d.verdict != Verdict::InsufficientData {
-        let _ = writeln!(
-            text,
-            "What is left: {:.4} {unit} RMS, noise {:.4}; {}",
-            d.unexplained.torque_rms, d.unexplained.noise_rms, d.unexplained.describes
-        );
+        let mut left = |of: &str, left: &Left, (factor, unit): (f64, &str)| {
+            let (rms, noise) = (factor * left.rms, factor * left.noise_rms);
+            let (said, of_noise) = (beside(rms, noise), beside(noise, rms));
+            let _ = writeln!(text, "What is left of {of}: {said} {unit} RMS, noise {of_noise}; {}", left.describes);
+        };
+        left(d.extended.drive.torque_word(), &d.unexplained.torque, (1.0, unit));
+        if let Some(table) = &d.unexplained.table {
+            left("table − motor", table, load);
+        }
     }
     text
+}
+
+/// Decimals by which a number has so many significant digits.
+fn decimals(value: f64, digits: i32) -> usize {
+    let value = value.abs();
+    if value > 0.0 && value.is_finite() { (digits - 1 - value.log10().floor() as i32).clamp(0, 12) as usize } else { 0 }
+}
+
+/// A value to as many decimals as its interval has, which has two digits; five digits where there is none.
+fn with_interval(value: f64, half: f64) -> String {
+    let places = if half > 0.0 && half.is_finite() { decimals(half, 2) } else { decimals(value, 5) };
+    format!("{value:.places$} ± {half:.places$}")
+}
+
+/// A value to as many decimals as three digits of it or of its neighbour take, whichever has more.
+fn beside(value: f64, neighbour: f64) -> String {
+    let places = decimals(value, 3).max(decimals(neighbour, 3));
+    format!("{value:.places$}")
 }
 
 /// Says how far the work is, where it was asked for, or where someone sits at a terminal and it takes more than a second.
@@ -205,18 +224,5 @@ impl Meter {
         if self.terminal && self.shown.load(Ordering::Relaxed) != u32::MAX {
             eprint!("\r\x1b[K");
         }
-    }
-}
-
-/// Two significant digits.
-struct Short(f64);
-
-impl std::fmt::Display for Short {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if self.0 == 0.0 || !self.0.is_finite() {
-            return write!(f, "{}", self.0);
-        }
-        let decimals = (1 - self.0.abs().log10().floor() as i32).clamp(0, 9) as usize;
-        write!(f, "{:.decimals$}", self.0)
     }
 }

@@ -9,7 +9,6 @@ use clap::Args;
 use gib::machine::Axis;
 use gib::plant::added::Added;
 use gib::plant::closed_loop::predict;
-use gib::plant::linear;
 use gib::plant::observed::Observed;
 use gib::recording::{Recording, Signal};
 use serde_json::{Map, Value, json};
@@ -161,7 +160,8 @@ impl Figures {
 
 /// RMS of the finite values.
 fn rms(values: impl Iterator<Item = f64>) -> f64 {
-    linear::rms(values.filter(|v| v.is_finite()))
+    let (sum, n) = values.filter(|v| v.is_finite()).fold((0.0, 0_u64), |(sum, n), v| (sum + v * v, n + 1));
+    (sum / n.max(1) as f64).sqrt()
 }
 
 fn write(file: &Path, time_s: &[f64], axes: &[Predicted<'_>]) -> io::Result<()> {

@@ -47,6 +47,9 @@ const LEAST_WEIGHT: f64 = 0.05;
 /// Share of the top speed at which an axis creeps: what dry friction does there depends on the formulation (a step, bristles,
 /// a steep slope), and no feed is so slow.
 const CREEPING: f64 = 1e-3;
+/// Share of the stroke to which two position sensors can be compared at all: 4 nm on 400 mm. Numbers of a simulation may agree
+/// to the last digit, scales do not.
+const SCALES_HOLD: f64 = 1e-8;
 /// Contiguous blocks for held-out judgement.
 const BLOCKS: usize = 24;
 
@@ -331,7 +334,7 @@ impl<'a> Frame<'a> {
         }
         // The grids of two position sensors do not average out where the axis creeps.
         let grid = self.columns.table.as_ref().and_then(|t| crate::analysis::statistics::grid(t)).unwrap_or(0.0);
-        noise.max(grid.hypot(self.grid) / 12f64.sqrt())
+        noise.max(grid.hypot(self.grid) / 12f64.sqrt()).max(SCALES_HOLD * (self.stroke.1 - self.stroke.0))
     }
 
     /// Time from the first row, s.

@@ -64,6 +64,8 @@ pub struct HeldOut<'g, 'f, 'a> {
     observed: Option<Observed>,
     /// The half that each row belongs to, see [`half_of_rows`].
     half: Vec<usize>,
+    /// What each row's torque says of a law, see [`weight_of_rows`].
+    weight: Vec<f64>,
 }
 
 impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
@@ -76,7 +78,8 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
             observed.command = None;
         }
         let half = observed.as_ref().map_or_else(Vec::new, |observed| half_of_rows(bench, &observed.time_s));
-        Self { axis, bench, watch, observed, half }
+        let weight = observed.as_ref().map_or_else(Vec::new, |observed| weight_of_rows(bench, &observed.time_s));
+        Self { axis, bench, watch, observed, half, weight }
     }
 
     /// Errors of the belief alone; `None` where nothing can be predicted.
@@ -108,6 +111,16 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
         let moving = torque_errors(observed, &prediction);
         let (sum, count) = moving.iter().filter(|e| e.is_finite()).fold((0.0, 0.0), |(s, n), e| (s + e * e, n + 1.0));
         (count > 0.0).then(|| f64::sqrt(sum / count))
+    }
+
+    /// Errors by which a law may be refuted: of the torque only in judged rows and as they count there. Where the axis sticks or
+    /// breaks away few rows hold more error than all others, and no law is answerable for it.
+    #[must_use]
+    pub fn judged(&self, errors: &Errors) -> Errors {
+        let [torque, position, table] = errors.clone();
+        let weighed =
+            |torque: Vec<f64>| torque.iter().zip(&self.weight).map(|(error, weight)| error * weight).collect();
+        [torque.map(weighed), position, table]
     }
 
     /// The gains of one set of causes over another by their errors.
@@ -150,6 +163,22 @@ fn half_of_rows(bench: &Bench, time_s: &[f64]) -> Vec<usize> {
             block += 1;
         }
         if t < begin(0) || t > last { NEITHER } else { half_of(block) }
+    };
+    time_s.iter().map(of).collect()
+}
+
+/// For each row the lesser weight of the two judged rows about it; NaN where rows between them are not judged.
+fn weight_of_rows(bench: &Bench, time_s: &[f64]) -> Vec<f64> {
+    let frame = bench.frame;
+    let stride = frame.kept.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap_or(1);
+    let mut after = 0;
+    let of = |&t: &f64| {
+        while after < frame.kept.len() && frame.columns.time_s[frame.kept[after]] < t {
+            after += 1;
+        }
+        let before = after.max(1) - 1;
+        let close = after < frame.kept.len() && frame.kept[after] - frame.kept[before] <= stride;
+        if close { frame.weights[before].min(frame.weights[after]) } else { f64::NAN }
     };
     time_s.iter().map(of).collect()
 }

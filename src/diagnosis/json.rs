@@ -55,9 +55,13 @@ impl Diagnosis {
         let u = &self.unexplained;
         let word = self.extended.drive.torque_word();
         let mut unexplained = Map::new();
-        unexplained.insert(format!("{word}_rms"), json!(u.torque_rms));
-        unexplained.insert(format!("{word}_noise_rms"), json!(u.noise_rms));
-        unexplained.insert("describes".into(), json!(u.describes));
+        unexplained.insert(format!("{word}_rms"), json!(u.torque.rms));
+        unexplained.insert(format!("{word}_noise_rms"), json!(u.torque.noise_rms));
+        unexplained.insert("describes".into(), json!(u.torque.describes));
+        if let Some(table) = &u.table {
+            let value = json!({ "rms": table.rms, "noise_rms": table.noise_rms, "describes": table.describes });
+            unexplained.insert("table_minus_motor".into(), value);
+        }
         unexplained.insert("lives_in".into(), Value::Object(shares(|view| view.after)));
         unexplained.insert("before_naming".into(), Value::Object(shares(|view| view.before)));
         if !self.missing.is_empty() {

@@ -31,7 +31,7 @@ pub const LITTLE_LEFT: f64 = 0.5;
 const MOSTLY: f64 = 2.0 / 3.0;
 /// Share of what is explained (in variance) that may be left along that coordinate: a sixth in amplitude. Laws of the right form
 /// leave a hundredth of that; several of a wrong form together imitate a curve, and leave more.
-const MOST_OF_A_CURVE: f64 = 0.03;
+pub const MOST_OF_A_CURVE: f64 = 0.03;
 
 /// Least ratio of what a machine errs by without a spring or clearance over what it errs by with it. In the balance a cause must
 /// take 4 % off the amplitude of what is left; a row as it was measured holds more noise.
@@ -94,12 +94,14 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             }
         }
         let gains = self.held_out.gains(self.believed.as_ref(), errors.as_ref());
+        let judged = |errors: &Option<Errors>| errors.as_ref().map(|errors| self.held_out.judged(errors));
+        let in_judged_rows = self.held_out.gains(judged(&self.believed).as_ref(), judged(&errors).as_ref());
         let effects: Vec<Effect> = found.fit.effects(self.bench.frame).collect();
-        if !refuted(&gains, &effects) {
+        if !refuted(&in_judged_rows, &effects) {
             return Ok(Judged { verdict, selection: found, gains, refutation: None });
         }
         let causes = found.fit.parts.iter().map(|p| p.law.cause);
-        let refutation = refutation(causes, &gains, "rows that it was not fitted to");
+        let refutation = refutation(causes, &in_judged_rows, "rows that it was not fitted to");
         Ok(Judged { refutation: Some(refutation), ..self.nothing(&found) })
     }
 
@@ -226,6 +228,12 @@ impl Excess {
     #[must_use]
     pub fn largest(&self) -> f64 {
         self.channels.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Of the torque, or of table − encoder.
+    #[must_use]
+    pub fn of_channel(&self, channel: usize) -> f64 {
+        self.channels.get(channel).copied().unwrap_or(0.0)
     }
 
     /// Share of this excess that is gone in the other, over the channels that had any.

@@ -36,4 +36,4 @@ pub mod verdict;
 pub use choice::axis_of;
 pub use progress::{Progress, Stopped};
 pub use show::{Coordinate, View};
-pub use verdict::{Diagnosis, Finding, Unexplained, Verdict, diagnose, usable};
+pub use verdict::{Diagnosis, Finding, Left, Unexplained, Verdict, diagnose, usable};

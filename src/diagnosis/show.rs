@@ -75,10 +75,15 @@ impl Coordinate {
 pub fn views(bench: &Bench, before: &Fit, after: &Fit) -> Vec<View> {
     let [before, _] = bench.rest(before);
     let [after, _] = bench.rest(after);
-    let frame = bench.frame;
+    against_all(bench.frame, &before, &after)
+}
+
+/// Two residuals of a channel at the judged rows against every coordinate.
+#[must_use]
+pub fn against_all(frame: &Frame, before: &[f64], after: &[f64]) -> Vec<View> {
     let grouped = |coordinate: Coordinate| {
         let places = places(frame, coordinate);
-        let (a, b) = (Groups::of(&places, &before), Groups::of(&places, &after));
+        let (a, b) = (Groups::of(&places, before), Groups::of(&places, after));
         let value = |at: f64| if coordinate == Coordinate::SinceReversal { at.exp() } else { at };
         let curve = a.means().zip(b.means()).map(|((at, a), (_, b))| (value(at), a, b)).collect();
         View { coordinate, before: a.share(), after: b.share(), curve }
@@ -87,9 +92,9 @@ pub fn views(bench: &Bench, before: &Fit, after: &Fit) -> Vec<View> {
         .into_iter()
         .map(|coordinate| match coordinate {
             Coordinate::Frequency => {
-                let (a, b) = (periods::spectrum(frame, &before), periods::spectrum(frame, &after));
+                let (a, b) = (periods::spectrum(frame, before), periods::spectrum(frame, after));
                 let curve = a.iter().zip(&b).map(|(a, b)| (a.0, a.1, b.1)).collect();
-                View { coordinate, before: lines(&a, &before), after: lines(&b, &after), curve }
+                View { coordinate, before: lines(&a, before), after: lines(&b, after), curve }
             }
             _ => grouped(coordinate),
         })

@@ -55,15 +55,24 @@ pub struct Finding {
     pub next_experiment: Option<(serde_json::Value, String)>,
 }
 
-/// What is left.
+/// What is left of a channel.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Unexplained {
-    /// RMS of the filtered torque residual, drive's own unit.
-    pub torque_rms: f64,
+pub struct Left {
+    /// RMS of the filtered residual.
+    pub rms: f64,
     /// Its noise floor.
     pub noise_rms: f64,
     /// Where it lives, in words.
     pub describes: String,
+}
+
+/// What is left.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unexplained {
+    /// Of the torque, drive's own unit.
+    pub torque: Left,
+    /// Of table − encoder, load units, where a table was recorded.
+    pub table: Option<Left>,
 }
 
 /// The whole answer.
@@ -181,12 +190,7 @@ fn answer(recorded: &Recorded, frame: &Frame, mut notes: Vec<String>) -> Result<
     let Judged { verdict, selection: Selection { fit, .. }, gains, .. } = judged;
     notes.extend(nameless(frame, &fit));
     let shown = show::views(&bench, &empty, &fit);
-    let [rest, _] = bench.rest(&fit);
-    let unexplained = Unexplained {
-        torque_rms: rms(&rest),
-        noise_rms: frame.floor(&rest, true),
-        describes: show::describe(&shown, Excess::of(&bench, &fit, &fit).largest()),
-    };
+    let unexplained = unexplained(&bench, &fit, &shown);
     watch.at(1.0, "done")?;
     Ok(Diagnosis { verdict, findings, gains, unexplained, shown, missing: Vec::new(), notes, extended })
 }
@@ -199,6 +203,19 @@ fn aligned(recorded: &Recorded, frame: &Frame, late_s: f64, mut notes: Vec<Strin
         if late_s > 0.0 { "late" } else { "early" }
     ));
     answer(recorded, &frame.aligned_by(late_s), notes)
+}
+
+/// What a fit leaves of each channel; `shown` is where that of the torque lives.
+fn unexplained(bench: &Bench, fit: &Fit, shown: &[View]) -> Unexplained {
+    let [torque, table] = bench.rest(fit);
+    let excess = Excess::of(bench, fit, fit);
+    let left = |rest: &[f64], channel: usize, views: &[View]| Left {
+        rms: rms(rest),
+        noise_rms: bench.frame.floor(rest, channel == 0),
+        describes: show::describe(views, excess.of_channel(channel)),
+    };
+    let of_table = || left(&table, 1, &show::against_all(bench.frame, &table, &table));
+    Unexplained { torque: left(&torque, 0, shown), table: (!table.is_empty()).then(of_table) }
 }
 
 fn extended_by(axis: &Axis, findings: &[Finding]) -> Axis {
@@ -219,7 +236,10 @@ fn insufficient(axis: &Axis, missing: Vec<String>) -> Diagnosis {
         verdict: Verdict::InsufficientData,
         findings: Vec::new(),
         gains: Vec::new(),
-        unexplained: Unexplained { torque_rms: 0.0, noise_rms: 0.0, describes: "not judged".into() },
+        unexplained: Unexplained {
+            torque: Left { rms: 0.0, noise_rms: 0.0, describes: "not judged".into() },
+            table: None,
+        },
         shown: Vec::new(),
         missing,
         notes: Vec::new(),

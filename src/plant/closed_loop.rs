@@ -85,10 +85,11 @@ fn replay(
         ));
     }
     let command = command_of_cycles(time, command, servo.period_s, cycles);
-    let at_start = |values: &[f64]| values.first().copied().filter(|value| value.is_finite());
+    let finite = |value: f64| Some(value).filter(|value| value.is_finite());
+    let at_start = |values: &[f64]| values.first().copied().and_then(finite);
     let velocity = at_start(&observed.motion.velocity).unwrap_or(0.0);
     let position = at_start(&observed.position).unwrap_or(command[0]);
-    let torque = at_start(&prediction.torque).unwrap_or(0.0);
+    let torque = finite(prediction.at_start).unwrap_or(0.0);
     let start = Start { position, velocity, torque };
     let setup = Setup { start: Some(start), ..Setup::default() };
     let trace = simulate_physics(axis, prediction.physics.clone(), &command, added, &setup, Noise::new(0))?;

@@ -46,7 +46,8 @@ impl Lateness {
         period * (whole + share(rate, part))
     }
 
-    /// The logging delay by which the column is so much later, s; the inverse of [`Lateness::of_delay`].
+    /// The logging delay by which the column is so much later, s; the inverse of [`Lateness::of_delay`], but of whole cycles
+    /// where torque goes in steps and the rest of a cycle would not be seen.
     #[must_use]
     pub fn delay_of(&self, late_s: f64) -> f64 {
         let Some((period, rate)) = self.cycle else { return late_s };
@@ -73,6 +74,11 @@ fn split(cycles: f64) -> (f64, f64) {
 /// stands for a time constant that is not known: what lies between the rows is open then.
 const STRAIGHT: f64 = 1e-3;
 
+/// Ts/τ above which torque goes in steps, and the share of a step up to which nobody can say whether a column is late by whole
+/// cycles or by nearly one more: within its step the torque stands. Logs are late by whole cycles as a rule.
+const STEPS: f64 = 4.0;
+const UNSEEN: f64 = 0.03;
+
 /// The share w of the earlier end of the cycle in a torque caught a part f of a cycle before its later end.
 fn share(rate: f64, part: f64) -> f64 {
     if rate < STRAIGHT {
@@ -83,7 +89,7 @@ fn share(rate: f64, part: f64) -> f64 {
 
 /// The part f of a cycle at which the earlier end has the share w.
 fn place(rate: f64, share: f64) -> f64 {
-    if rate < STRAIGHT {
+    if rate < STRAIGHT || rate > STEPS && share < UNSEEN {
         return share;
     }
     1.0 + (share + (1.0 - share) * (-rate).exp()).ln() / rate
@@ -107,6 +113,14 @@ mod tests {
             }
             assert_eq!([-2.0, 0.0, 3.0].map(|n| at(rate).of_delay(1e-3 * n)), [-2e-3, 0.0, 3e-3]);
         }
+    }
+
+    #[test]
+    fn where_torque_goes_in_steps_a_delay_is_of_whole_cycles() {
+        // A fiftieth of a cycle is what noise leaves open, not four fifths of the next.
+        assert!((at(20.0).delay_of(2.02e-3) - 2.02e-3).abs() < 1e-9);
+        assert!((at(20.0).delay_of(2.10e-3) - 2.88e-3).abs() < 1e-5);
+        assert!((at(2.0).delay_of(2.02e-3) - 2.06e-3).abs() < 1e-5);
     }
 
     /// A motor's torque in small steps of time, caught where the delay says.

@@ -13,7 +13,7 @@
 use super::coupling::{Giving, longest_step_s, transmitted};
 use super::friction::Friction;
 use super::lateness::Lateness;
-use super::linear::{decomposed, rms};
+use super::linear::decomposed;
 use super::motion::{Motion, cubic_at, flattened_at, passed, smoothed};
 use super::observed::Observed;
 use super::physics::{Physics, Ripple};
@@ -27,6 +27,8 @@ use std::ops::Range;
 pub struct TorquePrediction {
     /// Drive's own unit, one value a row; NaN where the motion is not known.
     pub torque: Vec<f64>,
+    /// The torque in the first row's own instant, whatever the column's delay; NaN where the motion is not known.
+    pub at_start: f64,
     /// The axis's numbers, with the phases that were estimated.
     pub physics: Physics,
     /// Ripples whose phase could not be had from the first quarter: they are left out of the prediction.
@@ -70,7 +72,8 @@ pub fn predict_torque(axis: &Axis, observed: &Observed) -> Result<TorquePredicti
                 if shift == 0.0 { part[i] } else { flattened_at(part, i as f64 - shift, flattened) };
         }
     }
-    Ok(TorquePrediction { torque, physics, phases_unknown })
+    let at_start = delivered.first().copied().unwrap_or(f64::NAN);
+    Ok(TorquePrediction { torque, at_start, physics, phases_unknown })
 }
 
 /// The share of a ripple that is passed at a speed that the motor must deliver: above the cut-off of the motion the axis gives
@@ -271,6 +274,11 @@ fn set_table_phases(physics: &mut Physics, observed: &Observed) {
     for (ripple, pair) in physics.table_error.iter_mut().zip(weights[2..].chunks_exact(2)) {
         ripple.phase = pair[1].atan2(pair[0]);
     }
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = values.fold((0.0, 0_u64), |(sum, n), v| (sum + v * v, n + 1));
+    (sum / n.max(1) as f64).sqrt()
 }
 
 /// Weights of the columns that come closest to the target; columns are scaled first, and useless ones get nothing.

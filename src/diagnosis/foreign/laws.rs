@@ -1,0 +1,240 @@
+//! The laws without a name: what machines do now and then, and what nobody has to be told a cause of before somebody has looked.
+//! Some have a form and few numbers; others take any form along one coordinate, by levels at places between which they go
+//! along straight lines.
+
+use crate::diagnosis::frame::Frame;
+
+/// Places along the stroke, over the speed or among the lengths and times at which something may begin or lie.
+pub const PLACES: usize = 24;
+/// Levels of a law that takes any form.
+const LEVELS: usize = 24;
+
+/// A law without a name.
+pub struct Foreign {
+    /// What the torque does, as said to a machinist.
+    pub goes: &'static str,
+    /// Numbers that it takes: its sizes, and where it begins or lies.
+    pub numbers: usize,
+    /// Whether it begins or lies somewhere, or has an exponent, a length or a time of its own.
+    pub somewhere: bool,
+    /// Regressors at a share, 0 to 1, of where that may be; drive's own unit or anything in proportion.
+    pub regressors: fn(&Frame, f64) -> Vec<Vec<f64>>,
+}
+
+impl Foreign {
+    /// Whether it takes any form along a coordinate.
+    pub fn takes_any_form(&self) -> bool {
+        self.numbers >= LEVELS
+    }
+}
+
+pub static LAWS: [Foreign; 20] = [
+    Foreign {
+        goes: "with the cube of speed",
+        numbers: 1,
+        somewhere: false,
+        regressors: |frame, _| vec![frame.judged_by(|i| frame.v[i].powi(3))],
+    },
+    Foreign {
+        goes: "with a root of speed",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, exponent| {
+            let top = frame.top_speed();
+            vec![frame.judged_by(|i| frame.direction[i] * (frame.v[i].abs() / top).powf(exponent))]
+        },
+    },
+    Foreign {
+        goes: "as a friction that is another about one speed",
+        numbers: 3,
+        somewhere: true,
+        regressors: |frame, share| vec![about(frame, share, 1.5)],
+    },
+    Foreign {
+        goes: "as a friction that is another about one speed",
+        numbers: 3,
+        somewhere: true,
+        regressors: |frame, share| vec![about(frame, share, 4.0)],
+    },
+    Foreign {
+        goes: "as a friction that grows with acceleration",
+        numbers: 1,
+        somewhere: false,
+        regressors: |frame, _| vec![frame.judged_by(|i| frame.direction[i] * frame.a[i].abs())],
+    },
+    Foreign {
+        goes: "as a friction that grows with the load",
+        numbers: 2,
+        somewhere: false,
+        // c·|T| of friction in T itself: a motor that drives needs 1/(1 − c) of the load, one that brakes 1/(1 + c).
+        regressors: |frame, _| {
+            let where_it = |drives: bool| {
+                frame.judged_by(|i| {
+                    let load = load(frame, i);
+                    if (load * frame.direction[i] > 0.0) == drives { load } else { 0.0 }
+                })
+            };
+            vec![where_it(true), where_it(false)]
+        },
+    },
+    Foreign {
+        goes: "as a motor that pushes harder one way than the other",
+        numbers: 1,
+        somewhere: false,
+        regressors: |frame, _| vec![frame.judged_by(|i| load(frame, i).abs())],
+    },
+    Foreign {
+        goes: "as a friction that is another after a rest",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| {
+            let (low, high) = frame.stroke();
+            let length = (high - low) * SHORTEST.powf(1.0 - share);
+            let way = way_since_rest(frame);
+            vec![frame.judged_by(|i| frame.direction[i] * (-way[i] / length).exp())]
+        },
+    },
+    Foreign {
+        goes: "as a drag that comes late",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| {
+            let late = late_speed(frame, LATEST_S * SHORTEST.powf(1.0 - share));
+            vec![frame.judged_by(|i| late[i])]
+        },
+    },
+    Foreign {
+        goes: "as a step along the stroke",
+        numbers: 3,
+        somewhere: true,
+        regressors: |frame, share| on_either_side(frame, share, |_| 1.0),
+    },
+    Foreign {
+        goes: "as a step of friction along the stroke",
+        numbers: 3,
+        somewhere: true,
+        regressors: |frame, share| on_either_side(frame, share, |i| frame.direction[i]),
+    },
+    Foreign {
+        goes: "as a torque that wanders in time",
+        numbers: LEVELS,
+        somewhere: false,
+        regressors: |frame, _| any_form(frame, |i| frame.seconds(i), |_| 1.0),
+    },
+    Foreign {
+        goes: "as a friction that wanders in time",
+        numbers: LEVELS,
+        somewhere: false,
+        regressors: |frame, _| any_form(frame, |i| frame.seconds(i), |i| frame.direction[i]),
+    },
+    Foreign {
+        goes: "as a drag that wanders in time",
+        numbers: LEVELS,
+        somewhere: false,
+        regressors: |frame, _| any_form(frame, |i| frame.seconds(i), |i| frame.v[i]),
+    },
+    Foreign {
+        goes: "as an inertia that changes in time",
+        numbers: LEVELS,
+        somewhere: false,
+        regressors: |frame, _| any_form(frame, |i| frame.seconds(i), |i| frame.a[i]),
+    },
+    Foreign {
+        goes: "as an inertia that changes along the stroke",
+        numbers: LEVELS,
+        somewhere: false,
+        regressors: |frame, _| any_form(frame, |i| frame.x[i], |i| frame.a[i]),
+    },
+    Foreign {
+        goes: "along the stroke, one way there and another way back",
+        numbers: 2 * LEVELS,
+        somewhere: false,
+        regressors: |frame, _| {
+            let one_way = |way: f64| {
+                any_form(frame, |i| frame.x[i], move |i| if frame.direction[i] * way > 0.0 { 1.0 } else { 0.0 })
+            };
+            [one_way(1.0), one_way(-1.0)].concat()
+        },
+    },
+    Foreign {
+        goes: "as a friction that goes another way with speed",
+        numbers: LEVELS,
+        somewhere: false,
+        regressors: |frame, _| any_form(frame, |i| frame.v[i].abs(), |i| frame.direction[i]),
+    },
+    Foreign {
+        goes: "as a friction that goes with acceleration",
+        numbers: LEVELS,
+        somewhere: false,
+        regressors: |frame, _| any_form(frame, |i| frame.a[i] * frame.direction[i], |i| frame.direction[i]),
+    },
+    Foreign {
+        goes: "as a motor whose torque is no straight line of its current",
+        numbers: LEVELS,
+        somewhere: false,
+        regressors: |frame, _| any_form(frame, |i| load(frame, i), |_| 1.0),
+    },
+];
+
+/// The shortest length, as a share of the stroke, and the shortest time, of the longest.
+const SHORTEST: f64 = 0.003;
+/// The longest time by which something comes late, s.
+const LATEST_S: f64 = 3.0;
+/// Share of the top speed below which an axis rests.
+const RESTS: f64 = 1e-3;
+
+/// Torque that moves the axis as believed.
+fn load(frame: &Frame, i: usize) -> f64 {
+    let b = &frame.belief;
+    (b.inertia * frame.a[i] + b.viscous * frame.v[i]) * frame.unit + b.coulomb * frame.direction[i] + b.constant
+}
+
+/// What a function of the row is below a place and beyond it.
+fn on_either_side(frame: &Frame, share: f64, of: impl Fn(usize) -> f64) -> Vec<Vec<f64>> {
+    let (low, high) = frame.stroke();
+    let place = low + share * (high - low);
+    [false, true].map(|beyond| frame.judged_by(|i| if (frame.x[i] > place) == beyond { of(i) } else { 0.0 })).into()
+}
+
+/// What a function of the row is at each level along a coordinate; between two levels it belongs to both.
+fn any_form(frame: &Frame, along: impl Fn(usize) -> f64, of: impl Fn(usize) -> f64) -> Vec<Vec<f64>> {
+    let judged = frame.kept.iter().map(|&i| along(i));
+    let (low, high) = judged.fold((f64::MAX, f64::MIN), |(low, high), a| (a.min(low), a.max(high)));
+    let per = (LEVELS - 1) as f64 / (high - low).max(1e-300);
+    let rows = 0..frame.x.len();
+    let at: Vec<(f64, f64)> = rows.map(|i| (((along(i) - low) * per).clamp(0.0, (LEVELS - 1) as f64), of(i))).collect();
+    (0..LEVELS).map(|level| frame.judged_by(|i| at[i].1 * (1.0 - (at[i].0 - level as f64).abs()).max(0.0))).collect()
+}
+
+/// Friction about one speed, over so many of the ways between two places.
+fn about(frame: &Frame, share: f64, ways: f64) -> Vec<f64> {
+    let top = frame.top_speed();
+    frame.fading(|i| ((frame.v[i].abs() / top - share) * PLACES as f64 / ways).powi(2))
+}
+
+/// Way since the axis rested or turned last, load units, every row.
+fn way_since_rest(frame: &Frame) -> Vec<f64> {
+    let slow = RESTS * frame.top_speed();
+    let mut way = vec![0.0; frame.x.len()];
+    for stretch in &frame.columns.stretches {
+        let mut direction = 0.0;
+        for i in stretch.clone().skip(1) {
+            let rests = frame.v[i].abs() < slow || frame.v[i].signum() != direction;
+            direction = frame.v[i].signum();
+            way[i] = if rests { 0.0 } else { way[i - 1] + (frame.x[i] - frame.x[i - 1]).abs() };
+        }
+    }
+    way
+}
+
+/// The speed through a lag of a time constant, load units/s, every row.
+fn late_speed(frame: &Frame, time_constant_s: f64) -> Vec<f64> {
+    let step = -(-frame.columns.period_s / time_constant_s).exp_m1();
+    let mut late = vec![0.0; frame.x.len()];
+    for stretch in &frame.columns.stretches {
+        for i in stretch.clone().skip(1) {
+            late[i] = late[i - 1] + step * (frame.v[i] - late[i - 1]);
+        }
+    }
+    late
+}
