@@ -9,6 +9,7 @@ use clap::Args;
 use gib::machine::Axis;
 use gib::plant::added::Added;
 use gib::plant::closed_loop::predict;
+use gib::plant::linear;
 use gib::plant::observed::Observed;
 use gib::recording::{Recording, Signal};
 use serde_json::{Map, Value, json};
@@ -160,8 +161,7 @@ impl Figures {
 
 /// RMS of the finite values.
 fn rms(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, n) = values.filter(|v| v.is_finite()).fold((0.0, 0_u64), |(sum, n), v| (sum + v * v, n + 1));
-    (sum / n.max(1) as f64).sqrt()
+    linear::rms(values.filter(|v| v.is_finite()))
 }
 
 fn write(file: &Path, time_s: &[f64], axes: &[Predicted<'_>]) -> io::Result<()> {

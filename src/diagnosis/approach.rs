@@ -11,7 +11,7 @@ use super::many::dot;
 const STAGES: [(f64, f64); 3] = [(0.05, 12.0), (0.02, 8.0), (0.006, 4.0)];
 /// Most moves in a stage.
 const MOVES: usize = 6;
-/// Least that a start, as large as it fits, takes off ln of the mean square of the sums for anything to be moved.
+/// Least that the best start takes off ln of the mean square of the sums for anything to be moved.
 const LEAST: f64 = 0.02;
 
 /// The stages of an approach.
@@ -33,21 +33,22 @@ impl<'f, 'a> Approach<'f, 'a> {
         self.stages.first().map_or_else(Vec::new, |(bench, _)| bench.parts(law, shapes))
     }
 
-    /// Non-linear parameters that the best start beside a set leads to; `None` where none shows anything.
+    /// Non-linear parameters that the best start beside a set leads to; `None` where that shows nothing.
     #[must_use]
     pub fn from(&self, starts: &[Part], set: &Fit) -> Option<Vec<f64>> {
         let ((first, stride), finer) = self.stages.split_first()?;
         let there = first.again(set);
-        let shows = |start: &Part| figure(&first.joined(&there, start)) < there.figure() - LEAST;
-        if !starts.iter().any(shows) {
-            return None;
-        }
+        let left = |part: &Part| first.left_beside(&there, part);
         let squares = |part: &Part| {
-            let left = first.left_beside(&there, part);
+            let left = left(part);
             dot(&left, &left)
         };
-        let nearest = starts.iter().map(|part| (squares(part), part)).min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let mut part = first.approached(&there, nearest.1.clone(), *stride, MOVES);
+        let (_, nearest) = starts.iter().map(|part| (squares(part), part)).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        // Starts lie so close that one of them takes off much of what a clearance makes.
+        if figure(&first.channels(&left(nearest))) > there.figure() - LEAST {
+            return None;
+        }
+        let mut part = first.approached(&there, nearest.clone(), *stride, MOVES);
         for (bench, stride) in finer {
             let start = bench.parts(part.law, vec![part.shape]).pop()?;
             part = bench.approached(&bench.again(set), start, *stride, MOVES);

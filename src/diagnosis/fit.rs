@@ -283,6 +283,12 @@ impl<'f, 'a> Bench<'f, 'a> {
         fit.coefficients.iter().map(|own| own.iter().map(|c| c - change.next().unwrap_or(&0.0)).collect()).collect()
     }
 
+    /// Mean square of what is left in each channel.
+    #[must_use]
+    pub fn channels(&self, left: &[f64]) -> Vec<f64> {
+        channel_squares(left, self.rows)
+    }
+
     /// The stacked rows of a block: those of the torque and, with a table scale, those of table − encoder.
     #[must_use]
     pub fn pieces(&self, block: Range<usize>) -> Vec<Range<usize>> {

@@ -6,6 +6,7 @@
 //! where the law holds in the others, so that d is white there.
 
 use super::closed_loop::command_of_cycles;
+use super::linear::rms;
 use super::observed::Observed;
 use super::servo::ServoLoop;
 use super::simulate::speed_of;
@@ -56,7 +57,7 @@ pub fn added(axis: &Axis, observed: &Observed) -> Option<Added> {
     };
     let (late, level, spread) = (0..=2 * FARTHEST).filter_map(level_and_spread).min_by(|a, b| a.2.total_cmp(&b.2))?;
     let change = median(some().map(|cycle| (difference(late, cycle + 1) - difference(late, cycle)).abs()).collect())?;
-    let (noise, worth) = (STANDS_OUT * spread / NORMAL_MEDIAN, WORTH * rms(measured));
+    let (noise, worth) = (STANDS_OUT * spread / NORMAL_MEDIAN, WORTH * rms(measured.iter().copied()));
     // White noise changes by √2 of itself from cycle to cycle, what a wrong law leaves by less than itself.
     if noise > worth && change < spread {
         return None;
@@ -100,10 +101,6 @@ fn asked_for(servo: &Servo, beyond: &[f64]) -> Vec<f64> {
 /// What is left after a cycle of a difference between the motor's torque and what it is asked for.
 fn rest_of_a_cycle(servo: &Servo) -> f64 {
     if servo.torque_time_constant_s > 0.0 { (-servo.period_s / servo.torque_time_constant_s).exp() } else { 0.0 }
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {

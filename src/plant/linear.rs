@@ -1,4 +1,4 @@
-//! Linear algebra that always ends.
+//! Linear algebra that always ends, and the size of a column.
 
 use nalgebra::{DMatrix, Dyn, SVD};
 
@@ -10,6 +10,13 @@ const MOST: usize = 1000;
 pub fn decomposed(matrix: DMatrix<f64>) -> Option<SVD<f64, Dyn, Dyn>> {
     let finite = matrix.iter().all(|value| value.is_finite());
     finite.then(|| SVD::try_new(matrix, true, true, 5.0 * f64::EPSILON, MOST))?
+}
+
+/// Root of the mean square; 0 of nothing.
+#[must_use]
+pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = values.fold((0.0, 0_u64), |(sum, n), v| (sum + v * v, n + 1));
+    (sum / n.max(1) as f64).sqrt()
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //! frequency at which motion and noise are equal. (Wiener 1949; Gustafsson, *Determining the initial states in
 //! forward-backward filtering*, 1996.)
 
+use super::linear::rms;
 use realfft::RealFftPlanner;
 use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
@@ -34,9 +35,7 @@ impl Motion {
     /// the fastest it is known, and never nothing. Dry friction at rest is not a function of the motion.
     #[must_use]
     pub fn standing_speed(&self) -> f64 {
-        let known = self.velocity.iter().filter(|v| v.is_finite());
-        let (sum, n) = known.fold((0.0, 0_u64), |(sum, n), v| (sum + v * v, n + 1));
-        let typical = (sum / n.max(1) as f64).sqrt();
+        let typical = rms(self.velocity.iter().copied().filter(|v| v.is_finite()));
         (3.0 * std::f64::consts::TAU * self.cutoff_hz * self.resolution).max(1e-6 * typical)
     }
 
@@ -337,11 +336,6 @@ mod tests {
             (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
         (0..n).map(|_| next() * 12f64.sqrt()).collect()
-    }
-
-    fn rms(values: impl Iterator<Item = f64>) -> f64 {
-        let (sum, n) = values.fold((0.0, 0), |(sum, n), v| (sum + v * v, n + 1));
-        (sum / f64::from(n)).sqrt()
     }
 
     #[test]

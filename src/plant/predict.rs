@@ -13,7 +13,7 @@
 use super::coupling::{Giving, longest_step_s, transmitted};
 use super::friction::Friction;
 use super::lateness::Lateness;
-use super::linear::decomposed;
+use super::linear::{decomposed, rms};
 use super::motion::{Motion, cubic_at, flattened_at, passed, smoothed};
 use super::observed::Observed;
 use super::physics::{Physics, Ripple};
@@ -274,11 +274,6 @@ fn set_table_phases(physics: &mut Physics, observed: &Observed) {
     for (ripple, pair) in physics.table_error.iter_mut().zip(weights[2..].chunks_exact(2)) {
         ripple.phase = pair[1].atan2(pair[0]);
     }
-}
-
-fn rms(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, n) = values.fold((0.0, 0_u64), |(sum, n), v| (sum + v * v, n + 1));
-    (sum / n.max(1) as f64).sqrt()
 }
 
 /// Weights of the columns that come closest to the target; columns are scaled first, and useless ones get nothing.

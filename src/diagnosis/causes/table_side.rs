@@ -6,16 +6,15 @@
 //! motor goes along the cubic of its positions and speeds: a straight line would take (ω·h)²/12 off what swings at ω, which
 //! looks like another inertia. The motion is as the encoder shows it: what smooths it takes the impacts off, and the table's
 //! torque comes out too small.
-//! Before flanks that meet the motor gives way between its rows, as [`Giving`] says.
-//!
-//! While the link of a clearance is loaded one way, c = J₂·ẍ₁ + φ·(Tc·sign(ẋ₁) + Tv·ẋ₁) + T0 keeps one flank in contact, the
-//! table moves with the motor, and nothing need be simulated.
+
+mod flanks;
+mod spring;
 
 use super::*;
 use crate::diagnosis::many::widest;
 use crate::diagnosis::sampling::NUMEROV;
 use crate::machine::TwoMasses;
-use crate::plant::coupling::Giving;
+use spring::MOST_STEPS;
 use std::cell::RefCell;
 use std::ops::Range;
 
@@ -33,68 +32,86 @@ pub fn believed(frame: &Frame, axis: &Axis) -> Option<Trace> {
 
 fn terms_of(frame: &Frame, splits: &[Option<TwoMasses>]) -> Vec<Term> {
     let sound: Vec<TwoMasses> = splits.iter().copied().flatten().collect();
-    let together = |masses: &[TwoMasses]| Tables::new(frame, masses).terms(masses.len());
+    let together = |masses: &[TwoMasses]| match masses {
+        [one] => Tables::<1>::new(frame, std::slice::from_ref(one)).terms(1),
+        several => Tables::<LANES>::new(frame, several).terms(several.len()),
+    };
     let mut found = sound.chunks(LANES).flat_map(together).collect::<Vec<_>>().into_iter();
     splits.iter().map(|split| split.and_then(|_| found.next()).unwrap_or_default()).collect()
 }
 
-/// How long flanks swing after they have met, s: three time constants of their damping.
-const SWING_S: f64 = 4e-3;
 /// Tables that are simulated side by side: each step waits for the one before it, so that several cost little more than one.
+/// A table by itself is simulated by itself.
 const LANES: usize = 8;
 /// Radians of the fastest swing to a step: of a spring, whose swing is all that there is, and of flanks.
 const STEP_RAD: [f64; 2] = [0.12, 0.35];
 
-type Lanes = [f64; LANES];
-
 thread_local! {
-    /// Torque and table − motor of every row, kept for the next simulation: handed back and asked for again each time, the
+    /// Torque and table − motor of every row and table, kept for the next simulation: handed back and asked for again each time, the
     /// memory would take as long as the simulation.
-    static ROOM: RefCell<[Vec<Lanes>; 2]> = const { RefCell::new([Vec::new(), Vec::new()]) };
+    static ROOM: RefCell<[Vec<f64>; 2]> = const { RefCell::new([Vec::new(), Vec::new()]) };
 }
 
 #[inline(always)]
-fn lanes(value: impl Fn(usize) -> f64) -> Lanes {
-    std::array::from_fn(value)
+fn lanes<const N: usize>(value: impl Fn(usize) -> f64) -> [f64; N] {
+    // A plain loop is inlined at any length, `array::from_fn` is not.
+    let mut lanes = [0.0; N];
+    for l in 0..N {
+        lanes[l] = value(l);
+    }
+    lanes
 }
 
 /// Tables behind one motor that moves as measured; motor's coordinate.
-struct Tables<'a> {
+struct Tables<'a, const N: usize> {
     frame: &'a Frame<'a>,
-    inertia: Lanes,
-    /// How the motor gives way.
-    giving: Giving,
-    motor_mobility: Lanes,
-    /// Share of friction, its dry level and its viscous slope.
-    share: Lanes,
-    level: Lanes,
-    viscous: Lanes,
+    inertia: [f64; N],
+    motor_inertia: [f64; N],
+    /// Share of friction, and its dry level.
+    share: [f64; N],
+    level: [f64; N],
     /// Half the clearance.
-    half: Lanes,
-    stiffness: Lanes,
-    damping: Lanes,
-    /// Steps a row.
+    half: [f64; N],
+    /// The spring as the steps need it, and how much softer that is than the real one.
+    stiffness: [f64; N],
+    softer: [f64; N],
+    damping: [f64; N],
+    /// Pieces between two rows, steps of all of them, and the time of each step, s.
+    pieces: usize,
     steps: usize,
-    /// Wind-up of the real spring over that of the simulated one.
-    wind: Lanes,
+    step_s: f64,
+    /// What a step makes of a torque and of the speed there is, and what speed dry friction takes in it at most.
+    mobility: [f64; N],
+    kept: [f64; N],
+    dry: [f64; N],
     /// Whether there is a dead zone: flanks push and never pull.
     flanks: bool,
 }
 
-/// Where the tables are.
-struct State {
-    position: Lanes,
-    speed: Lanes,
-    /// Rows since the flanks met last, while they stay together, and the way they push.
-    together: [usize; LANES],
-    side: Lanes,
-    /// How the motor has given way.
-    given: [Lanes; 3],
-    /// Not known to move with the motor.
-    loose: [bool; LANES],
+/// The way of the motor from a row to the next: value and derivatives of the cubic by shares of the time between them.
+#[derive(Clone, Copy)]
+struct Way {
+    at: f64,
+    rate: f64,
+    bend: f64,
+    twist: f64,
 }
 
-impl<'a> Tables<'a> {
+impl Way {
+    /// Position after a share of the time.
+    #[inline(always)]
+    fn position(&self, s: f64) -> f64 {
+        self.at + s * (self.rate + s * (self.bend + s * self.twist))
+    }
+
+    /// Speed there, per time between rows.
+    #[inline(always)]
+    fn speed(&self, s: f64) -> f64 {
+        self.rate + s * (2.0 * self.bend + s * 3.0 * self.twist)
+    }
+}
+
+impl<'a, const N: usize> Tables<'a, N> {
     fn new(frame: &'a Frame<'a>, masses: &[TwoMasses]) -> Self {
         let b = &frame.belief;
         // Lanes without a table of their own repeat the last.
@@ -104,24 +121,31 @@ impl<'a> Tables<'a> {
         let flanks = masses.iter().any(|m| m.clearance > 0.0);
         let radians = frame.columns.period_s * fastest.fold(0.0, f64::max);
         let steps = (radians / STEP_RAD[usize::from(flanks)]).ceil().clamp(1.0, 1000.0);
-        let h = frame.columns.period_s / steps;
+        let pieces = if flanks { 1.0 } else { (steps / MOST_STEPS).ceil() };
+        let steps = pieces * (steps / pieces).ceil();
+        let step_s = frame.columns.period_s / steps;
+        let (inertia, level) = (of(|m| m.table_inertia), share.map(|s| s * b.coulomb));
+        let mobility = inertia.map(|j| step_s / j);
         // In steps of h a spring swings at ω when it is softer by (sin(ωh/2)/(ωh/2))² (leapfrog integration).
-        let swing = of(|m| (m.stiffness / m.table_inertia).sqrt()).map(|omega| (0.5 * h * omega).clamp(1e-9, 1.0));
+        let swing = of(|m| (m.stiffness / m.table_inertia).sqrt()).map(|omega| (0.5 * step_s * omega).clamp(1e-9, 1.0));
         let softer = swing.map(|half| (half.sin() / half).powi(2));
         let stiffness = of(|m| m.stiffness);
         Self {
             frame,
-            inertia: of(|m| m.table_inertia),
-            giving: Giving::new(frame.columns.period_s, h),
-            motor_mobility: of(|m| m.motor_inertia).map(|j| h / j),
+            inertia,
+            motor_inertia: of(|m| m.motor_inertia),
             share,
-            level: share.map(|s| s * b.coulomb),
-            viscous: share.map(|s| s * b.viscous),
+            level,
             half: of(|m| 0.5 * m.clearance),
+            softer,
             stiffness: lanes(|l| stiffness[l] * softer[l]),
-            wind: if flanks { [1.0; LANES] } else { softer },
             damping: of(|m| m.damping),
+            pieces: pieces as usize,
             steps: steps as usize,
+            step_s,
+            mobility,
+            kept: lanes(|l| 1.0 - mobility[l] * share[l] * b.viscous),
+            dry: lanes(|l| mobility[l] * level[l]),
             flanks,
         }
     }
@@ -134,16 +158,22 @@ impl<'a> Tables<'a> {
             let lags = if self.frame.columns.table.is_some() { rows } else { 0 };
             for (column, rows) in [(&mut *extra, rows), (&mut *lag, lags)] {
                 column.clear();
-                column.resize(rows, [0.0; LANES]);
+                column.resize(N * rows, 0.0);
             }
+            let [extra, lag] = [extra, lag].map(|column| column.as_chunks_mut::<N>().0);
+            let sliding = if self.flanks { None } else { Some(self.sliding()) };
             for s in &self.frame.columns.stretches {
                 widest(
                     #[inline(always)]
-                    || self.stretch(s.clone(), extra, lag),
+                    || match &sliding {
+                        Some(sliding) => self.behind_springs(sliding, s.clone(), extra, lag),
+                        None => self.behind_flanks(s.clone(), extra, lag),
+                    },
                 );
             }
             let torques = self.frame.low_passed_together(extra);
-            let tables = if lags > 0 { self.frame.low_passed_together(lag) } else { Default::default() };
+            let tables =
+                if lags > 0 { self.frame.low_passed_together(lag) } else { std::array::from_fn(|_| Vec::new()) };
             let term = |(torque, table)| Term { fixed: Some(Trace { torque, table }), regressors: Vec::new() };
             torques.into_iter().zip(tables).take(count).map(term).collect()
         })
@@ -151,67 +181,17 @@ impl<'a> Tables<'a> {
 
     /// Torque that the link of a rigid axis carries at a row.
     #[inline(always)]
-    fn carried(&self, i: usize) -> Lanes {
+    fn carried(&self, i: usize) -> [f64; N] {
         let (b, unit) = (&self.frame.belief, self.frame.unit);
         let acceleration = self.frame.a[i] * unit;
         let friction = b.coulomb * self.frame.direction[i] + b.viscous * self.frame.v[i] * unit;
         lanes(|l| self.inertia[l] * acceleration + self.share[l] * friction + b.constant)
     }
 
-    #[inline(always)]
-    fn stretch(&self, rows: Range<usize>, extra: &mut [Lanes], lag: &mut [Lanes]) {
-        let unit = self.frame.unit;
-        let settled = (SWING_S / self.frame.columns.period_s).ceil() as usize;
-        // Where the table of a rigid link is at a load.
-        let behind = |l: usize, motor: f64, load: f64| motor - self.half[l].copysign(load) - load / self.stiffness[l];
-        let mut load = self.carried(rows.start);
-        let mut state = State {
-            position: [0.0; LANES],
-            speed: [0.0; LANES],
-            together: [0; LANES],
-            side: [0.0; LANES],
-            given: [[0.0; LANES]; 3],
-            loose: [false; LANES],
-        };
-        for i in rows.start..rows.end - 1 {
-            let next = self.carried(i + 1);
-            let motor = self.frame.columns.position[i] * unit;
-            let steady = i > rows.start && self.frame.direction[i] * self.frame.direction[i + 1] > 0.5;
-            let mut any = false;
-            for l in 0..LANES {
-                // Near no load the flanks may part within the row.
-                let least = 0.1 * self.level[l];
-                let firm =
-                    self.flanks && steady && load[l].abs() > least && next[l].abs() > least && load[l] * next[l] > 0.0;
-                let held = !state.loose[l] || state.together[l] >= settled && state.side[l] * load[l] > 0.0;
-                if firm && held || !state.loose[l] {
-                    state.position[l] = behind(l, motor, load[l]);
-                    state.speed[l] = self.frame.raw_speed[i] * unit;
-                    state.together[l] = 0;
-                    (state.given[0][l], state.given[1][l], state.given[2][l]) = (0.0, 0.0, load[l]);
-                }
-                state.loose[l] = !(firm && held);
-                any |= state.loose[l];
-            }
-            if let Some(lag) = lag.get_mut(i) {
-                *lag = lanes(|l| self.wind[l] * (state.position[l] - motor) / unit);
-            }
-            if any {
-                let [near, far] = self.between(i, &mut state);
-                let rigid = self.rigid(i);
-                for l in (0..LANES).filter(|l| state.loose[*l]) {
-                    extra[i][l] += near[l] - rigid[0][l];
-                    extra[i + 1][l] += far[l] - rigid[1][l];
-                }
-            }
-            load = next;
-        }
-    }
-
-    /// What the link of a rigid axis carries between a row and the next, shared between them as [`Tables::between`] does: the
+    /// What the link of a rigid axis carries between a row and the next, shared between them by how near it acts: the
     /// triangular mean of the acceleration is a second difference, that of friction is taken as the base takes it.
     #[inline(always)]
-    fn rigid(&self, i: usize) -> [Lanes; 2] {
+    fn rigid(&self, i: usize) -> [[f64; N]; 2] {
         let (b, unit, span) = (&self.frame.belief, self.frame.unit, self.frame.columns.period_s);
         let step = self.frame.columns.position[i + 1] - self.frame.columns.position[i];
         let speed = |i: usize| self.frame.raw_speed[i];
@@ -226,64 +206,15 @@ impl<'a> Tables<'a> {
         ]
     }
 
-    /// Moves the tables on by one row; answers the share of each link's torque that belongs to the row and to the next one, by
-    /// how near it acts.
+    /// The motor's way from a row to the next.
     #[inline(always)]
-    fn between(&self, i: usize, state: &mut State) -> [Lanes; 2] {
-        if self.flanks { self.steps_of::<true>(i, state) } else { self.steps_of::<false>(i, state) }
-    }
-
-    #[inline(always)]
-    fn steps_of<const FLANKS: bool>(&self, i: usize, state: &mut State) -> [Lanes; 2] {
-        let (unit, span) = (self.frame.unit, self.frame.columns.period_s);
-        let at = |i: usize| (self.frame.columns.position[i] * unit, self.frame.raw_speed[i] * unit * span);
+    fn way(&self, i: usize) -> Way {
+        let unit = self.frame.unit;
+        let at = |i: usize| {
+            (self.frame.columns.position[i] * unit, self.frame.raw_speed[i] * unit * self.frame.columns.period_s)
+        };
         let ((q0, d0), (q1, d1)) = (at(i), at(i + 1));
-        let (c2, c3) = (3.0 * (q1 - q0) - 2.0 * d0 - d1, 2.0 * (q0 - q1) + d0 + d1);
-        let (per_step, per_span) = (1.0 / self.steps as f64, 1.0 / span);
-        let half_step = 0.5 * span * per_step;
-        // What a step makes of a torque, of the speed there is, and what speed dry friction takes at most.
-        let mobility = self.inertia.map(|j| span * per_step / j);
-        let kept = lanes(|l| 1.0 - mobility[l] * self.viscous[l]);
-        let dry = lanes(|l| mobility[l] * self.level[l]);
-        let (mut x, mut v) = (state.position, state.speed);
-        let [mut give, mut giving, mut answered] = state.given;
-        let (mut sum, mut far, mut least) = ([0.0; LANES], [0.0; LANES], [f64::INFINITY; LANES]);
-        for step in 0..self.steps {
-            let s = (step as f64 + 0.5) * per_step;
-            let motor = q0 + s * (d0 + s * (c2 + s * c3));
-            let speed = (d0 + s * (2.0 * c2 + s * 3.0 * c3)) * per_span;
-            for l in 0..LANES {
-                let middle = x[l] + half_step * v[l];
-                let wind = motor - middle + if FLANKS { give[l] } else { 0.0 };
-                let push = if FLANKS {
-                    // Flanks push and never pull.
-                    let outward = (speed + giving[l] - v[l]) * 1.0f64.copysign(wind);
-                    let beyond = wind.abs() - self.half[l];
-                    let spring = larger(self.stiffness[l] * beyond + self.damping[l] * outward, 0.0);
-                    let push = if beyond > 0.0 { spring } else { 0.0 };
-                    least[l] = smaller(push, least[l]);
-                    push.copysign(wind)
-                } else {
-                    self.stiffness[l] * wind + self.damping[l] * (speed - v[l])
-                };
-                if FLANKS {
-                    [give[l], giving[l], answered[l]] =
-                        self.giving.step([give[l], giving[l], answered[l]], push, self.motor_mobility[l]);
-                }
-                sum[l] += push;
-                far[l] += s * push;
-                // Dry friction takes what speed it can, and never turns it.
-                let free = kept[l] * v[l] + mobility[l] * (push - self.frame.belief.constant);
-                v[l] = free - larger(smaller(free, dry[l]), -dry[l]);
-                x[l] = middle + half_step * v[l];
-            }
-        }
-        (state.position, state.speed, state.side) = (x, v, sum);
-        state.given = [give, giving, answered];
-        for l in 0..LANES {
-            state.together[l] = if least[l] > 0.0 { state.together[l] + 1 } else { 0 };
-        }
-        [lanes(|l| (sum[l] - far[l]) * per_step), far.map(|far| far * per_step)]
+        Way { at: q0, rate: d0, bend: 3.0 * (q1 - q0) - 2.0 * d0 - d1, twist: 2.0 * (q0 - q1) + d0 + d1 }
     }
 }
 

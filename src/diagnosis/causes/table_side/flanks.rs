@@ -1,0 +1,116 @@
+//! Tables behind the flanks of a clearance. Before flanks that meet the motor gives way between its rows, as [`Giving`] says.
+//!
+//! While the link of a clearance is loaded one way, c = J₂·ẍ₁ + φ·(Tc·sign(ẋ₁) + Tv·ẋ₁) + T0 keeps one flank in contact, the
+//! table moves with the motor, and nothing need be simulated.
+
+use super::*;
+use crate::plant::coupling::Giving;
+
+/// How long flanks swing after they have met, s: three time constants of their damping.
+const SWING_S: f64 = 4e-3;
+
+/// Where the tables are.
+struct State<const N: usize> {
+    position: [f64; N],
+    speed: [f64; N],
+    /// Rows since the flanks met last, while they stay together, and the way they push.
+    together: [usize; N],
+    side: [f64; N],
+    /// How the motor has given way.
+    given: [[f64; N]; 3],
+    /// Not known to move with the motor.
+    loose: [bool; N],
+}
+
+impl<const N: usize> Tables<'_, N> {
+    #[inline(always)]
+    pub(super) fn behind_flanks(&self, rows: Range<usize>, extra: &mut [[f64; N]], lag: &mut [[f64; N]]) {
+        let unit = self.frame.unit;
+        let giving = Giving::new(self.frame.columns.period_s, self.step_s);
+        let settled = (SWING_S / self.frame.columns.period_s).ceil() as usize;
+        // Where the table of a rigid link is at a load.
+        let behind = |l: usize, motor: f64, load: f64| motor - self.half[l].copysign(load) - load / self.stiffness[l];
+        let mut load = self.carried(rows.start);
+        let mut state = State {
+            position: [0.0; N],
+            speed: [0.0; N],
+            together: [0; N],
+            side: [0.0; N],
+            given: [[0.0; N]; 3],
+            loose: [false; N],
+        };
+        for i in rows.start..rows.end - 1 {
+            let next = self.carried(i + 1);
+            let motor = self.frame.columns.position[i] * unit;
+            let steady = i > rows.start && self.frame.direction[i] * self.frame.direction[i + 1] > 0.5;
+            let mut any = false;
+            for l in 0..N {
+                // Near no load the flanks may part within the row.
+                let least = 0.1 * self.level[l];
+                let firm = steady && load[l].abs() > least && next[l].abs() > least && load[l] * next[l] > 0.0;
+                let held = !state.loose[l] || state.together[l] >= settled && state.side[l] * load[l] > 0.0;
+                if firm && held || !state.loose[l] {
+                    state.position[l] = behind(l, motor, load[l]);
+                    state.speed[l] = self.frame.raw_speed[i] * unit;
+                    state.together[l] = 0;
+                    (state.given[0][l], state.given[1][l], state.given[2][l]) = (0.0, 0.0, load[l]);
+                }
+                state.loose[l] = !(firm && held);
+                any |= state.loose[l];
+            }
+            if let Some(lag) = lag.get_mut(i) {
+                *lag = lanes(|l| (state.position[l] - motor) / unit);
+            }
+            if any {
+                let [near, far] = self.between(&self.way(i), giving, &mut state);
+                let rigid = self.rigid(i);
+                for l in (0..N).filter(|l| state.loose[*l]) {
+                    extra[i][l] += near[l] - rigid[0][l];
+                    extra[i + 1][l] += far[l] - rigid[1][l];
+                }
+            }
+            load = next;
+        }
+    }
+
+    /// Moves the tables on by one row; answers the share of each link's torque that belongs to the row and to the next one, by
+    /// how near it acts.
+    #[inline(always)]
+    fn between(&self, way: &Way, yielding: Giving, state: &mut State<N>) -> [[f64; N]; 2] {
+        let (per_step, per_span) = (1.0 / self.steps as f64, 1.0 / self.frame.columns.period_s);
+        let half_step = 0.5 * self.step_s;
+        let motor_mobility = self.motor_inertia.map(|j| self.step_s / j);
+        let (mut x, mut v) = (state.position, state.speed);
+        let [mut give, mut giving, mut answered] = state.given;
+        let (mut sum, mut far, mut least) = ([0.0; N], [0.0; N], [f64::INFINITY; N]);
+        for step in 0..self.steps {
+            let s = (step as f64 + 0.5) * per_step;
+            let (motor, speed) = (way.position(s), way.speed(s) * per_span);
+            for l in 0..N {
+                let middle = x[l] + half_step * v[l];
+                let wind = motor - middle + give[l];
+                // Flanks push and never pull.
+                let outward = (speed + giving[l] - v[l]) * 1.0f64.copysign(wind);
+                let beyond = wind.abs() - self.half[l];
+                let spring = larger(self.stiffness[l] * beyond + self.damping[l] * outward, 0.0);
+                let push = if beyond > 0.0 { spring } else { 0.0 };
+                least[l] = smaller(push, least[l]);
+                let push = push.copysign(wind);
+                [give[l], giving[l], answered[l]] =
+                    yielding.step([give[l], giving[l], answered[l]], push, motor_mobility[l]);
+                sum[l] += push;
+                far[l] += s * push;
+                // Dry friction takes what speed it can, and never turns it.
+                let free = self.kept[l] * v[l] + self.mobility[l] * (push - self.frame.belief.constant);
+                v[l] = free - larger(smaller(free, self.dry[l]), -self.dry[l]);
+                x[l] = middle + half_step * v[l];
+            }
+        }
+        (state.position, state.speed, state.side) = (x, v, sum);
+        state.given = [give, giving, answered];
+        for l in 0..N {
+            state.together[l] = if least[l] > 0.0 { state.together[l] + 1 } else { 0 };
+        }
+        [lanes(|l| (sum[l] - far[l]) * per_step), far.map(|far| far * per_step)]
+    }
+}
