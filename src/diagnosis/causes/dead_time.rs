@@ -22,9 +22,10 @@ pub static LAW: Law = Law {
     approached: false,
     simulated: false,
     terms: |frame, shapes| {
+        let torque = frame.torque(0.0);
         each(shapes, |shape| {
             let moved = frame.torque(1e-3 * shape[0]);
-            let fixed = frame.torque(0.0).iter().zip(moved).map(|(a, b)| a - b).collect();
+            let fixed = torque.iter().zip(moved).map(|(a, b)| a - b).collect();
             Term { fixed: Some(Trace::torque(fixed)), regressors: Vec::new() }
         })
     },
