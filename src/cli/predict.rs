@@ -40,7 +40,7 @@ impl Predict {
     /// Predicts and writes.
     pub fn run(&self) -> Result {
         let machine = machine_file::load(&self.machine)?;
-        let recording = Recording::open(&self.recording)?;
+        let mut recording = Recording::open(&self.recording)?;
         let shared: Vec<&Axis> =
             machine.axes.iter().filter(|axis| recording.get(&axis.name, Signal::Position).is_some()).collect();
         if shared.is_empty() {
@@ -49,7 +49,7 @@ impl Predict {
             return Err(format!("{file}: no position column of an axis of the machine ({})", names.join(", ")).into());
         }
         let axes: Vec<Predicted> =
-            shared.iter().map(|axis| Predicted::of(axis, &recording)).collect::<std::result::Result<_, _>>()?;
+            shared.iter().map(|axis| Predicted::of(axis, &mut recording)).collect::<std::result::Result<_, _>>()?;
         write(&self.out, &recording.time_s, &axes)?;
         if self.json {
             let figures: Map<String, Value> = axes.iter().map(|p| (p.axis.name.clone(), p.figures().json())).collect();
@@ -73,8 +73,8 @@ struct Predicted<'a> {
 }
 
 impl<'a> Predicted<'a> {
-    fn of(axis: &'a Axis, recording: &Recording) -> std::result::Result<Self, Box<dyn std::error::Error>> {
-        let observed = Observed::of(recording, axis)?;
+    fn of(axis: &'a Axis, recording: &mut Recording) -> std::result::Result<Self, Box<dyn std::error::Error>> {
+        let observed = Observed::taken(recording, axis)?;
         let prediction = predict(axis, &observed)?;
         let position = prediction.closed_loop.map(|replayed| replayed.position);
         let (torque, phases_unknown) = (prediction.torque.torque, prediction.torque.phases_unknown);

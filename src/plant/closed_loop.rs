@@ -129,25 +129,25 @@ fn fill_rest(prediction: &mut TorquePrediction, observed: &Observed, replayed: &
 /// The command at the start of each servo cycle: interpolated between rows, held over rows without one.
 #[must_use]
 pub fn command_of_cycles(time_s: &[f64], command: &[f64], period: f64, cycles: usize) -> Vec<f64> {
-    let rows: Vec<(f64, f64)> =
-        time_s.iter().zip(command).filter(|(_, x)| x.is_finite()).map(|(t, x)| (t - time_s[0], *x)).collect();
-    let Some((&(_, first), &(_, last))) = rows.first().zip(rows.last()) else { return vec![0.0; cycles] };
-    let mut row = 0;
+    let known = time_s.iter().zip(command).filter(|(_, x)| x.is_finite());
+    let mut rows = known.map(|(t, x)| (t - time_s[0], *x));
+    let Some((mut now, first)) = rows.next().map(|row| (row, row.1)) else { return vec![0.0; cycles] };
+    let mut next = rows.next();
     (0..cycles)
         .map(|cycle| {
             let t = cycle as f64 * period;
-            while row + 1 < rows.len() && rows[row + 1].0 <= t + 1e-3 * period {
-                row += 1;
+            while let Some(row) = next.filter(|row| row.0 <= t + 1e-3 * period) {
+                (now, next) = (row, rows.next());
             }
-            let (t0, x0) = rows[row];
+            let (t0, x0) = now;
             // Times are written rounded: a thousandth of a cycle is none.
             if (t - t0).abs() <= 1e-3 * period {
                 return x0;
             }
-            match rows.get(row + 1) {
-                Some(&(t1, x1)) if t >= t0 => x0 + (x1 - x0) * (t - t0) / (t1 - t0),
+            match next {
+                Some((t1, x1)) if t >= t0 => x0 + (x1 - x0) * (t - t0) / (t1 - t0),
                 Some(_) => first,
-                None => last,
+                None => x0,
             }
         })
         .collect()

@@ -54,7 +54,9 @@ impl Motion {
         let period_s = (time_s[longest.end - 1] - time_s[longest.start]) / (longest.len() - 1) as f64;
         let pieces: Vec<&[f64]> = stretches.iter().map(|s| &position[s.clone()]).collect();
         let cutoff_hz = noise_crossing_hz(&pieces, period_s);
-        let nothing = || vec![f64::NAN; position.len()];
+        // A motion of all rows is taken as it is: long recordings have no room for a copy.
+        let whole = longest.len() == position.len();
+        let nothing = || if whole { Vec::new() } else { vec![f64::NAN; position.len()] };
         let mut motion =
             Motion { position: nothing(), velocity: nothing(), acceleration: nothing(), cutoff_hz, resolution: 0.0 };
         let (mut square, mut rows) = (0.0, 0);
@@ -62,11 +64,16 @@ impl Motion {
             let Some(part) = Self::with_cutoff(&time_s[s.clone()], &position[s.clone()], Some(cutoff_hz)) else {
                 continue;
             };
-            motion.position[s.clone()].copy_from_slice(&part.position);
-            motion.velocity[s.clone()].copy_from_slice(&part.velocity);
-            motion.acceleration[s.clone()].copy_from_slice(&part.acceleration);
             square += part.resolution * part.resolution * s.len() as f64;
             rows += s.len();
+            if whole {
+                (motion.position, motion.velocity, motion.acceleration) =
+                    (part.position, part.velocity, part.acceleration);
+            } else {
+                motion.position[s.clone()].copy_from_slice(&part.position);
+                motion.velocity[s.clone()].copy_from_slice(&part.velocity);
+                motion.acceleration[s.clone()].copy_from_slice(&part.acceleration);
+            }
         }
         motion.resolution = (square / rows.max(1) as f64).sqrt();
         Some(motion)
@@ -82,7 +89,7 @@ impl Motion {
         let start = time_s[0];
         let period = (time_s[n - 1] - start) / (n - 1) as f64;
         let regular = are_even(time_s, 0.02);
-        let grid: Vec<f64> = if regular { position.to_vec() } else { resample(time_s, position, period) };
+        let grid = if regular { Cow::Borrowed(position) } else { Cow::Owned(resample(time_s, position, period)) };
         let cutoff_hz = cutoff_hz.unwrap_or_else(|| noise_crossing_hz(&[&grid], period)).min(0.4 / period);
         let [smooth, velocity, acceleration] = differentiate(&grid, period, cutoff_hz);
         let back = |values: Vec<f64>| {
@@ -184,12 +191,26 @@ pub fn smoothed(values: &[f64], period: f64, cutoff_hz: f64) -> Vec<f64> {
     if values.len() < FEWEST_ROWS {
         return values.to_vec();
     }
-    let [smooth, _, _] = differentiate(values, period, cutoff_hz);
-    smooth
+    let (mut x, pad) = low_passed(values, period, cutoff_hz);
+    x.truncate(pad + values.len());
+    x.drain(..pad);
+    x
 }
 
 /// Smoothed series and its first two derivatives.
 fn differentiate(values: &[f64], period: f64, cutoff_hz: f64) -> [Vec<f64>; 3] {
+    let n = values.len();
+    let (x, pad) = low_passed(values, period, cutoff_hz);
+    let at = |i: usize, k: isize| x[(i + pad).saturating_add_signed(k)];
+    // Central differences of fourth order; the padding gives them neighbours at both ends.
+    let first = |i| (8.0 * (at(i, 1) - at(i, -1)) - (at(i, 2) - at(i, -2))) / (12.0 * period);
+    let second =
+        |i| (16.0 * (at(i, 1) + at(i, -1)) - (at(i, 2) + at(i, -2)) - 30.0 * at(i, 0)) / (12.0 * period * period);
+    [(0..n).map(|i| at(i, 0)).collect(), (0..n).map(first).collect(), (0..n).map(second).collect()]
+}
+
+/// Smoothed series with some rows before and after it, and how many there are before it.
+fn low_passed(values: &[f64], period: f64, cutoff_hz: f64) -> (Vec<f64>, usize) {
     let n = values.len();
     // Six periods of the cut-off: the filter has forgotten its start by then.
     let pad = ((6.0 / (cutoff_hz * period)) as usize).clamp(4, n - 1);
@@ -202,19 +223,15 @@ fn differentiate(values: &[f64], period: f64, cutoff_hz: f64) -> [Vec<f64>; 3] {
     let beyond = |(value, bend): (f64, f64), k: usize, mirror: f64| 2.0 * value - mirror + bend * (k * k) as f64;
     let before = (1..=pad).rev().map(|k| beyond(head, k, values[k]));
     let after = (1..=pad).map(|k| beyond(tail, k, values[n - 1 - k]));
-    let mut x: Vec<f64> = before.chain(values.iter().copied()).chain(after).collect();
+    let mut x = Vec::with_capacity(n + 2 * pad);
+    x.extend(before.chain(values.iter().copied()).chain(after));
     for section in Section::butterworth4(cutoff_hz * period) {
         section.run(&mut x);
         x.reverse();
         section.run(&mut x);
         x.reverse();
     }
-    let at = |i: usize, k: isize| x[(i + pad).saturating_add_signed(k)];
-    // Central differences of fourth order; the padding gives them neighbours at both ends.
-    let first = |i| (8.0 * (at(i, 1) - at(i, -1)) - (at(i, 2) - at(i, -2))) / (12.0 * period);
-    let second =
-        |i| (16.0 * (at(i, 1) + at(i, -1)) - (at(i, 2) + at(i, -2)) - 30.0 * at(i, 0)) / (12.0 * period * period);
-    [(0..n).map(|i| at(i, 0)).collect(), (0..n).map(first).collect(), (0..n).map(second).collect()]
+    (x, pad)
 }
 
 /// Value and second derivative (per row squared) at the first row of the parabola nearest to the values.

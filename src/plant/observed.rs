@@ -28,34 +28,47 @@ pub struct Observed {
 }
 
 impl Observed {
-    /// Takes the axis's columns from a recording.
+    /// The axis's columns of a recording.
     ///
     /// # Errors
     /// Position or torque (force) is missing or in a unit of another quantity; no stretch of rows is whole.
     pub fn of(recording: &Recording, axis: &Axis) -> Result<Observed, RecordingError> {
+        Self::taken(&mut recording.clone(), axis)
+    }
+
+    /// The same, taken out of the recording: long ones have no room for a copy.
+    ///
+    /// # Errors
+    /// As [`Observed::of`].
+    pub fn taken(recording: &mut Recording, axis: &Axis) -> Result<Observed, RecordingError> {
         let load_unit = if axis.drive.is_rotary() { Unit::Deg } else { Unit::Mm };
-        let (signal, torque_unit) =
+        let (torque_signal, torque_unit) =
             if axis.drive.is_linear() { (Signal::Force, Unit::N) } else { (Signal::Torque, Unit::Nm) };
-        let required = |signal: Signal, unit: Unit| {
+        let factor = |signal: Signal, unit: Unit| {
             let column = recording.column(&axis.name, signal)?;
-            match column.to(unit) {
-                Some(values) => Ok(values.into_owned()),
-                None => {
-                    let drive = axis.drive.name();
-                    let message = format!(
-                        "must be in {} or a unit that converts to it: the machine's drive is {drive}",
-                        unit.suffix()
-                    );
-                    Err(RecordingError::new(&recording.file, message).in_column(&column.name))
-                }
-            }
+            column.label.as_ref().and_then(|label| label.unit.factor_to(unit)).ok_or_else(|| {
+                let drive = axis.drive.name();
+                let message = format!(
+                    "must be in {} or a unit that converts to it: the machine's drive is {drive}",
+                    unit.suffix()
+                );
+                RecordingError::new(&recording.file, message).in_column(&column.name)
+            })
         };
-        let optional = |signal| recording.get(&axis.name, signal).map(|_| required(signal, load_unit)).transpose();
-        let position = required(Signal::Position, load_unit)?;
-        let torque = required(signal, torque_unit)?;
-        let command = optional(Signal::PositionCommand)?;
-        let table_position = optional(Signal::TablePosition)?;
+        let optional = |signal| recording.get(&axis.name, signal).map(|_| factor(signal, load_unit)).transpose();
+        let (position, torque) = (factor(Signal::Position, load_unit)?, factor(torque_signal, torque_unit)?);
+        let (command, table) = (optional(Signal::PositionCommand)?, optional(Signal::TablePosition)?);
         let runs = recording.runs(&[recording.column(&axis.name, Signal::Position)?]);
+        let mut take = |signal: Signal, factor: f64| {
+            let mut values = recording.take(&axis.name, signal).map_or_else(Vec::new, |column| column.values);
+            if factor != 1.0 {
+                values.iter_mut().for_each(|value| *value *= factor);
+            }
+            values
+        };
+        let (position, torque) = (take(Signal::Position, position), take(torque_signal, torque));
+        let command = command.map(|factor| take(Signal::PositionCommand, factor));
+        let table_position = table.map(|factor| take(Signal::TablePosition, factor));
         let observed = Self::from_columns(recording.time_s.clone(), position, torque, command, table_position, runs);
         observed.ok_or_else(|| {
             let message = format!(

@@ -85,10 +85,14 @@ pub fn simulate(axis: &Axis, command: &[f64], setup: &Setup) -> Result<Trace, St
     let mut noise = Noise::new(setup.seed);
     let ripples = physics.cogging.iter_mut().chain(&mut physics.vibration).chain(&mut physics.table_error);
     ripples.for_each(|ripple| ripple.phase = TAU * noise.uniform());
-    simulate_physics(axis, physics, command, &[], setup, noise)
+    let trace = simulate_physics(axis, physics, command, &[], setup, noise)?;
+    let period_s = axis.servo.map_or(0.0, |servo| servo.period_s);
+    let time_s = (0..command.len()).map(|cycle| cycle as f64 * period_s).collect();
+    Ok(Trace { time_s, command: command.to_vec(), ..trace })
 }
 
-/// The same with phases given, and with torque that is added to the servo's in each cycle (empty for none).
+/// The same with phases given, and with torque that is added to the servo's in each cycle (empty for none); times and command
+/// are left out, since long recordings have no room for what is known.
 ///
 /// # Errors
 /// As [`simulate`].
@@ -121,13 +125,13 @@ pub fn simulate_physics(
     let age = (setup.sensors.delay_s / step_s).round() as usize;
     let (late, fine) = (age.div_ceil(steps), (steps - age % steps) % steps);
     let mut seen = vec![(body.motor_position(), body.table_position()); late];
-    let mut trace = Trace::default();
+    let room = || Vec::with_capacity(command.len());
+    let mut trace = Trace { position: room(), table_position: room(), ..Trace::default() };
     let mut torques = Vec::with_capacity(command.len());
     for (cycle, &target) in command.iter().enumerate() {
         let now = (body.motor_position(), body.table_position());
         let (motor, table_motor) = if late == 0 { now } else { seen[cycle % late] };
         let read = encoder.read(motor / scale, &mut noise);
-        trace.time_s.push(cycle as f64 * servo.period_s);
         trace.position.push(read);
         trace.table_position.push(encoder.digitise(table.table_of(table_motor / scale), &mut noise));
         let speed = speed_of(command, cycle) / servo.period_s;
@@ -141,7 +145,6 @@ pub fn simulate_physics(
         }
         body.advance(asked, steps - fine);
     }
-    trace.command = command.to_vec();
     let grid = setup.sensors.torque_grid;
     trace.torque = (0..command.len())
         .map(|cycle| on_grid(log.at(&torques, cycle) + noise.normal(setup.sensors.torque_noise), grid))

@@ -157,6 +157,13 @@ impl Recording {
         })
     }
 
+    /// The column of this channel and signal, taken out of the recording.
+    pub fn take(&mut self, channel: &str, signal: Signal) -> Option<Column> {
+        let wanted = |label: &Label| label.channel == channel && label.signal == signal;
+        let at = self.columns.iter().position(|column| column.label.as_ref().is_some_and(wanted))?;
+        Some(self.columns.remove(at))
+    }
+
     /// The column of this channel and signal.
     ///
     /// # Errors
