@@ -129,7 +129,7 @@ homing_branch homing_world_break(homing_world *w, homing_fault fault)
     if (fault == FAULT_ABORT) {
         gib_homing_abort(homing_world_gib(w));
     } else {
-        homing_plant_break(&w->plant, fault);
+        homing_plant_break(&w->plant, fault, -1);
     }
     while (w->status == GIB_BUSY && w->cycles - from < 200000) {
         homing_world_step(w);

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#define BRAKE_NM 5.0
+
 /* splitmix64: one word of state, good enough for sensor noise. */
 double homing_plant_uniform(uint64_t *state)
 {
@@ -70,19 +72,34 @@ static double unit_nm(const homing_plant *p)
     return p->c.torque_unit_nm != 0.0 ? p->c.torque_unit_nm : 1.0;
 }
 
-void homing_plant_break(homing_plant *p, homing_fault fault)
+static uint32_t bit(homing_fault fault)
 {
-    p->fault = fault;
+    return fault == FAULT_NONE ? 0u : 1u << fault;
+}
+
+/* Whether side `s` has `fault`. */
+static int has(const homing_plant *p, const homing_plant_side *s, homing_fault fault)
+{
+    return ((p->faults | s->faults) & bit(fault)) != 0;
+}
+
+void homing_plant_break(homing_plant *p, homing_fault fault, int side)
+{
     for (int i = 0; i < p->c.motors; i++) {
         homing_plant_side *s = &p->side[i];
+        if (side == 1 - i) {
+            continue;
+        }
+        s->faults |= side == i ? bit(fault) : 0u;
         if (fault == FAULT_STOP_GONE) {
             p->c.stop_mm[i] += 1e6;
         } else if (fault == FAULT_TORQUE_STUCK_HIGH) {
-            p->side[i].stuck_at = 4.9;
+            s->stuck_at = 4.9;
         } else if (fault == FAULT_STOP_EARLY && s->y < p->c.stop_mm[i]) {
             p->c.stop_mm[i] = fmin(p->c.stop_mm[i], s->y + 0.1);
         }
     }
+    p->faults |= side < 0 ? bit(fault) : 0u;
     switch (fault) {
     case FAULT_LIMIT_LOST:
         p->limit_nm = p->c.torque_limit_nm;
@@ -96,6 +113,24 @@ void homing_plant_break(homing_plant *p, homing_fault fault)
     case FAULT_STOP_SOFT: p->c.stop_stiffness_nm_mm = 4.0; break;
     case FAULT_TORQUE_NOISY: p->c.torque_noise_nm = 1.5; break;
     default: break;
+    }
+}
+
+void homing_plant_mend(homing_plant *p, homing_fault fault)
+{
+    uint32_t left = fault == FAULT_NONE ? 0u : ~bit(fault);
+    p->faults &= left;
+    for (int i = 0; i < p->c.motors; i++) {
+        p->side[i].faults &= left;
+    }
+    if (fault == FAULT_NONE || fault == FAULT_TIGHT_SPOT) {
+        p->c.tight_nm = 0.0;
+    }
+    if (fault == FAULT_NONE || fault == FAULT_TORQUE_NOISY) {
+        p->c.torque_noise_nm = fmin(p->c.torque_noise_nm, 0.1);
+    }
+    if (fault == FAULT_NONE || fault == FAULT_LIMIT_NAN) {
+        p->in.torque_limit = p->limit_nm / fabs(unit_nm(p));
     }
 }
 
@@ -143,6 +178,12 @@ double homing_plant_lead(const homing_plant_config *c, double speed)
     return copysign(0.5 * c->clearance_mm, slides) + slides / c->stiffness_nm_mm;
 }
 
+/* The drive is off and its brake on. */
+static int braked(const homing_plant *p)
+{
+    return p->out.stop_drive || (p->faults & bit(FAULT_DRIVE_TRIP));
+}
+
 static void substep(homing_plant *p, homing_plant_side *s, int i, double torque_command, double dt)
 {
     const homing_plant_config *c = &p->c;
@@ -151,9 +192,11 @@ static void substep(homing_plant *p, homing_plant_side *s, int i, double torque_
     double wound = deadzone(s->x - s->y, c->clearance_mm);
     double drive = wound != 0.0 ? c->stiffness_nm_mm * wound + c->damping_nm_s_mm * (s->vx - s->vy) : 0.0;
     double against = c->constant_nm + c->viscous_nm_s_mm * s->vy;
-    against += pushes(s->y - c->stop_mm[i], s->vy, c->stop_stiffness_nm_mm, c->stop_damping_nm_s_mm);
+    double depth = s->y - c->stop_mm[i];
+    double stiffens = c->stop_power > 0.0 && depth > 0.0 ? pow(depth / 0.02, c->stop_power - 1.0) : 1.0;
+    against += pushes(depth, s->vy, stiffens * c->stop_stiffness_nm_mm, c->stop_damping_nm_s_mm);
     if (c->chips_mm > 0.0) {
-        double depth = s->y - (c->stop_mm[i] - c->chips_mm) - s->crushed;
+        depth = s->y - (c->stop_mm[i] - c->chips_mm) - s->crushed;
         against += pushes(depth, s->vy, c->chips_stiffness_nm_mm, 0.0);
         /* Pressed hard they give way, once by the crushed layer. */
         if (c->chips_stiffness_nm_mm * depth > 2.0 && s->crushed < c->chips_mm) {
@@ -166,7 +209,7 @@ static void substep(homing_plant *p, homing_plant_side *s, int i, double torque_
     }
     double far = (s->y - c->tight_mm) / c->tight_width_mm;
     double friction = (1.0 - c->motor_share) * c->friction_nm + c->tight_nm * fmax(0.0, 1.0 - far * far);
-    double motor_friction = c->motor_share * c->friction_nm;
+    double motor_friction = c->motor_share * c->friction_nm + (braked(p) ? BRAKE_NM : 0.0);
     move(&s->x, &s->vx, &s->motor_sticks, s->torque - drive, motor_friction, motor_friction,
          c->motor_inertia_nm_s2_mm, dt);
     move(&s->y, &s->vy, &s->table_sticks, drive - against, table_friction(c, friction, s->vy),
@@ -192,14 +235,14 @@ static double servo(homing_plant *p, homing_plant_side *s, double target, double
 static double encoder(homing_plant *p, homing_plant_side *s)
 {
     const homing_plant_config *c = &p->c;
-    if (p->fault == FAULT_ENCODER_SLIPS && s->vx > 0.0) {
+    if (has(p, s, FAULT_ENCODER_SLIPS) && s->vx > 0.0) {
         s->slipped += 0.02 * s->vx * c->cycle_s; /* 2 % on the way to the stop only */
-    } else if (p->fault == FAULT_ENCODER_JUMPS && s->slipped == 0.0) {
+    } else if (has(p, s, FAULT_ENCODER_JUMPS) && s->slipped == 0.0) {
         s->slipped = 0.3;
     }
     double x = s->x - s->slipped;
     double grid = c->encoder_mm > 0.0 ? c->encoder_mm * floor(x / c->encoder_mm + 0.5) : x;
-    if (p->fault != FAULT_ENCODER_FROZEN) {
+    if (!has(p, s, FAULT_ENCODER_FROZEN)) {
         s->frozen_at = grid;
     }
     return s->frozen_at;
@@ -211,30 +254,27 @@ static double torque_reading(homing_plant *p, homing_plant_side *s)
     if (p->c.torque_grid_nm > 0.0) {
         t = p->c.torque_grid_nm * round(t / p->c.torque_grid_nm);
     }
-    switch (p->fault) {
-    case FAULT_TORQUE_STUCK:
-    case FAULT_TORQUE_STUCK_HIGH: return s->stuck_at;
-    case FAULT_TORQUE_NAN: return NAN;
-    case FAULT_TORQUE_PLUS_INF: return INFINITY;
-    case FAULT_TORQUE_MINUS_INF: return -INFINITY;
-    case FAULT_TORQUE_INVERTED: return -t;
-    default: s->stuck_at = t; return t;
+    if (has(p, s, FAULT_TORQUE_STUCK) || has(p, s, FAULT_TORQUE_STUCK_HIGH)) {
+        return s->stuck_at;
     }
+    if (has(p, s, FAULT_TORQUE_NAN) || has(p, s, FAULT_TORQUE_PLUS_INF) || has(p, s, FAULT_TORQUE_MINUS_INF)) {
+        return has(p, s, FAULT_TORQUE_NAN) ? NAN : has(p, s, FAULT_TORQUE_PLUS_INF) ? INFINITY : -INFINITY;
+    }
+    t = has(p, s, FAULT_TORQUE_INVERTED) ? -t : t;
+    s->stuck_at = t;
+    return t;
 }
 
-static uint32_t flags(homing_fault fault)
+static uint32_t flags(const homing_plant *p)
 {
-    switch (fault) {
-    case FAULT_DRIVE_TRIP: return GIB_INPUT_FAULT;
-    case FAULT_ABORT: return GIB_INPUT_ABORT;
-    case FAULT_FLAG_UNKNOWN: return 1u << 20;
-    default: return 0u;
-    }
+    uint32_t trips = p->faults & bit(FAULT_DRIVE_TRIP) ? GIB_INPUT_FAULT : 0u;
+    uint32_t aborts = p->faults & bit(FAULT_ABORT) ? GIB_INPUT_ABORT : 0u;
+    return trips | aborts | (p->faults & bit(FAULT_FLAG_UNKNOWN) ? 1u << 20 : 0u);
 }
 
 static void serve_requests(homing_plant *p)
 {
-    if (p->out.request_id == p->done_id || p->fault == FAULT_NO_ACKNOWLEDGEMENT) {
+    if (p->out.request_id == p->done_id || p->faults & bit(FAULT_NO_ACKNOWLEDGEMENT)) {
         p->waited = 0;
         return;
     }
@@ -243,7 +283,7 @@ static void serve_requests(homing_plant *p)
     }
     if (p->out.requests & GIB_HOMING_REQUEST_TORQUE_LIMIT) {
         p->in.torque_limit = p->out.torque_limit;
-        if (p->fault != FAULT_LIMIT_IGNORED) {
+        if (!(p->faults & bit(FAULT_LIMIT_IGNORED))) {
             p->limit_nm = p->out.torque_limit * fabs(unit_nm(p));
         }
     }
@@ -266,7 +306,7 @@ const gib_homing_input *homing_plant_cycle(homing_plant *p)
         p->in.torque_limit = p->limit_nm / fabs(unit_nm(p));
     }
     serve_requests(p);
-    if (p->fault == FAULT_CHIPS && c->chips_mm == 0.0 && p->side[0].y < c->stop_mm[0] - 0.35) {
+    if (p->faults & bit(FAULT_CHIPS) && c->chips_mm == 0.0 && p->side[0].y < c->stop_mm[0] - 0.35) {
         p->c.chips_mm = 0.3;
         p->c.chips_stiffness_nm_mm = 60.0;
         p->c.chips_crush_mm = 0.2;
@@ -274,19 +314,18 @@ const gib_homing_input *homing_plant_cycle(homing_plant *p)
     for (int i = 0; i < c->motors; i++) {
         homing_plant_side *s = &p->side[i];
         double x = encoder(p, s);
-        double told = p->fault == FAULT_ENCODER_NAN ? NAN : p->fault == FAULT_ENCODER_INF ? INFINITY : x;
+        double told = has(p, s, FAULT_ENCODER_NAN) ? NAN : has(p, s, FAULT_ENCODER_INF) ? INFINITY : x;
         p->in.position_mm[i] = c->sense * told;
         p->in.torque[i] = c->sense * torque_reading(p, s) / unit_nm(p);
-        int follows = p->out.owns_motion && p->fault != FAULT_NOT_FOLLOWED;
+        int follows = p->out.owns_motion && !has(p, s, FAULT_NOT_FOLLOWED);
         double target = follows ? c->sense * p->out.target_position_mm[i] : s->last_target;
         if (p->first_cycle || (p->owned && !p->out.owns_motion)) {
             s->last_encoder = p->first_cycle ? x : s->last_encoder;
             s->last_target = target = x; /* the kernel takes over where the axis is */
         }
         double wanted = servo(p, s, target, x);
-        if (p->out.stop_drive || p->fault == FAULT_DRIVE_TRIP) {
+        if (braked(p)) {
             wanted = s->integral = 0.0;
-            s->vx *= 0.5; /* the brake */
         }
         for (int k = 0; k < c->substeps; k++) {
             substep(p, s, i, wanted, c->cycle_s / c->substeps);
@@ -295,10 +334,10 @@ const gib_homing_input *homing_plant_cycle(homing_plant *p)
         p->most_travel_mm = fmax(p->most_travel_mm, s->y);
     }
     p->in.acknowledged_id = p->done_id;
-    if (p->fault == FAULT_LIMIT_NAN) {
+    if (p->faults & bit(FAULT_LIMIT_NAN)) {
         p->in.torque_limit = NAN;
     }
-    p->in.flags = flags(p->fault);
+    p->in.flags = flags(p);
     p->first_cycle = 0;
     p->owned = p->out.owns_motion;
     p->time_s += c->cycle_s;

@@ -24,6 +24,7 @@ typedef struct {
     double friction_nm, motor_share, breakaway_ratio, viscous_nm_s_mm, constant_nm;
     double stribeck_mm_s; /* below about this speed the table's friction rises to break-away; 0: only at rest */
     double stop_mm[2], stop_stiffness_nm_mm, stop_damping_nm_s_mm;
+    double stop_power; /* of the way pressed in, to which the stop's force goes: 1.5 for a ball; 0: 1; the stiffness is at 20 um */
     double beam_nm_mm;                                             /* crossbeam of a gantry */
     double chips_mm, chips_stiffness_nm_mm, chips_crush_mm;        /* layer before the stop; what a press crushes */
     double tight_mm, tight_width_mm, tight_nm;                     /* extra friction there */
@@ -73,6 +74,7 @@ typedef struct {
     double torque, integral, last_encoder, last_target;
     double crushed; /* of the chips */
     double slipped, frozen_at, stuck_at;
+    uint32_t faults; /* of this side alone */
 } homing_plant_side;
 
 typedef struct {
@@ -85,7 +87,7 @@ typedef struct {
     double shift_mm[2];
     gib_homing_output out;
     gib_homing_input in;
-    homing_fault fault;
+    uint32_t faults; /* of both sides and of the kernel: 1 << homing_fault */
     int first_cycle, owned;
     uint64_t random;
     double time_s;
@@ -96,8 +98,10 @@ homing_plant_config homing_plant_default(void);
 void homing_plant_init(homing_plant *p, const homing_plant_config *c);
 /* By how much the motor leads its table, which slides at `speed` mm/s toward the stop: half the clearance and the wind-up. */
 double homing_plant_lead(const homing_plant_config *c, double speed);
-/* From now on `fault` is there. */
-void homing_plant_break(homing_plant *p, homing_fault fault);
+/* From now on `fault` is there, beside those that are; of motor `side` alone where it is 0 or 1, else of both. */
+void homing_plant_break(homing_plant *p, homing_fault fault, int side);
+/* Sensor, drive or kernel is well again; of FAULT_NONE all are. What has become of stop, chips and encoder stays. */
+void homing_plant_mend(homing_plant *p, homing_fault fault);
 /* The axis moves for one cycle as gib asked for in `out`, and the kernel carries out requests; fills `in`. */
 const gib_homing_input *homing_plant_cycle(homing_plant *p);
 /* Uniform in [0, 1). */

@@ -60,6 +60,31 @@ static void home_depends_on_neither_limit_nor_stiffness(void **state)
     assert_true(fabs(threshold[1] - threshold[0]) > 20.0);
 }
 
+/* Of a ball or a pad, which stiffens with the force, home is found late, and gib says how late at most, where the bend of the line
+ * stands out of the noise. */
+static void a_stop_that_stiffens_is_said_to(void **state)
+{
+    (void)state;
+    for (int power = 0; power < 3; power++) {
+        for (int i = 0; i < 8; i++) {
+            static const double SOFT[2] = {60.0, 200.0};
+            homing_plant_config c = homing_plant_default();
+            c.seed = 300u + (uint64_t)i;
+            c.torque_noise_nm = 0.03;
+            c.stop_power = 1.0 + 0.5 * power;
+            c.stop_stiffness_nm_mm = SOFT[i % 2];
+            gib_homing_config g = homing_config(&c);
+            homing_outcome o = homing_run(&c, &g);
+            const gib_homing_side *s = &o.report.side[0];
+            assert_int_equal(o.status, GIB_DONE);
+            print_message("power %.1f, %3.0f N.m/mm: home %.2f um late, says %.2f\n", c.stop_power, c.stop_stiffness_nm_mm,
+                          -o.home_error_um, s->uncertainty_um);
+            assert_true(fabs(o.home_error_um) <= s->uncertainty_um);
+            assert_true(power > 0 || s->uncertainty_um < 5.0);
+        }
+    }
+}
+
 /* A rotary axis is the same axis in degrees, and the lag may be dropped without the kernel. */
 static void degrees_and_instant_lag_reduction(void **state)
 {
@@ -212,6 +237,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(homes_either_way),
         cmocka_unit_test(home_depends_on_neither_limit_nor_stiffness),
+        cmocka_unit_test(a_stop_that_stiffens_is_said_to),
         cmocka_unit_test(degrees_and_instant_lag_reduction),
         cmocka_unit_test(torque_unit_and_polarity),
         cmocka_unit_test(springs_back_when_the_deviation_is_dropped),

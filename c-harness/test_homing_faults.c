@@ -150,7 +150,7 @@ static void no_torque_while_the_restore_is_waited_for(void **state)
         }
         for (int k = 0; k < 40; k++) {
             memcpy(&copy, &w, sizeof copy);
-            copy.plant.fault = FAULT_NO_ACKNOWLEDGEMENT;
+            homing_plant_break(&copy.plant, FAULT_NO_ACKNOWLEDGEMENT, -1);
             gib_homing_abort(homing_world_gib(&copy));
             while (copy.status == GIB_BUSY) {
                 homing_world_step(&copy);
@@ -244,7 +244,7 @@ static void calls_in_the_wrong_order(void **state)
     b = homing_world_break(&w, FAULT_NO_ACKNOWLEDGEMENT);
     assert_int_equal(b.status, GIB_ERR_ACK_TIMEOUT);
     assert_int_equal(gib_homing_start(homing_world_gib(&w), &w.config), GIB_ERR_RESTORE_UNCONFIRMED);
-    w.plant.fault = FAULT_NONE;
+    homing_plant_mend(&w.plant, FAULT_NONE);
     for (int i = 0; i < 10; i++) {
         homing_world_step(&w);
     }

@@ -3,6 +3,7 @@
  * encoder, noise, limit and speed. Each either homes, within what it says of itself, or ends in a named fault; all are safe.
  * Another seed than the fresh one that is printed: test_homing_random SEED [RUNS].
  */
+#include "homing_axes.h"
 #include "homing_run.h"
 
 #include <setjmp.h>
@@ -17,49 +18,6 @@
 static uint64_t seed;
 static int runs = 150;
 
-static double between(uint64_t *random, double low, double high)
-{
-    return low + (high - low) * homing_plant_uniform(random);
-}
-
-static double over(uint64_t *random, double low, double high)
-{
-    return exp(between(random, log(low), log(high)));
-}
-
-static homing_plant_config random_axis(uint64_t *random)
-{
-    static const double CYCLES[] = {0.00025, 0.0005, 0.001, 0.001, 0.001, 0.002, 0.004};
-    static const double GRIDS[] = {0.0, 1e-5, 1e-4, 1e-3};
-    homing_plant_config c = homing_plant_default();
-    c.seed = (uint64_t)between(random, 1.0, 1e15);
-    c.cycle_s = CYCLES[(int)between(random, 0.0, 7.0)];
-    c.substeps = (int)ceil(c.cycle_s / 0.00005);
-    c.sense = between(random, 0.0, 1.0) < 0.5 ? 1.0 : -1.0;
-    c.stop_stiffness_nm_mm = over(random, 60.0, 4000.0);
-    c.stiffness_nm_mm = over(random, 60.0, 600.0);
-    c.friction_nm = between(random, 0.1, 2.0);
-    c.motor_share = between(random, 0.0, 0.4);
-    c.breakaway_ratio = between(random, 1.0, 1.5);
-    c.stribeck_mm_s = between(random, 0.0, 1.0) < 0.5 ? 0.0 : over(random, 0.3, 5.0);
-    /* Less than friction holds: see the limits in docs/homing.md. */
-    c.constant_nm = fmax(between(random, -0.8, 0.8), -0.9 * (1.0 - c.motor_share) * c.friction_nm);
-    c.clearance_mm = between(random, 0.0, 0.03);
-    c.viscous_nm_s_mm = between(random, 0.0, 0.02);
-    double heavy = over(random, 0.3, 4.0);
-    c.motor_inertia_nm_s2_mm *= heavy;
-    c.table_inertia_nm_s2_mm *= heavy;
-    /* Gains that a servo of this cycle and inertia can have. */
-    c.position_gain_1_s = between(random, 20.0, 60.0) * (c.cycle_s > 0.003 ? 0.6 : 1.0);
-    c.velocity_gain_nm_s_mm = 0.33 * heavy * between(random, 0.6, 1.2);
-    c.velocity_gain_nm_s_mm *= c.cycle_s > 0.003 ? 0.4 : c.cycle_s > 0.0015 ? 0.7 : 1.0;
-    c.velocity_integral_time_s = between(random, 0.01, 0.04) * (c.cycle_s > 0.0015 ? 2.0 : 1.0);
-    c.velocity_feedforward = between(random, 0.0, 1.0) < 0.3 ? 0.0 : 1.0;
-    c.torque_noise_nm = between(random, 0.0, 0.2);
-    c.encoder_mm = GRIDS[(int)between(random, 0.0, 4.0)];
-    return c;
-}
-
 static void homed_within_what_it_says_or_refused_by_name(void **state)
 {
     (void)state;
@@ -67,10 +25,10 @@ static void homed_within_what_it_says_or_refused_by_name(void **state)
     int homed = 0, held = 0, refused = 0;
     double worst = 0.0, worst_share = 0.0;
     for (int i = 0; i < runs; i++) {
-        homing_plant_config c = random_axis(&random);
+        homing_plant_config c = homing_random_axis(&random);
         gib_homing_config g = homing_config(&c);
-        g.torque_limit_nm = between(&random, 4.0, 8.0);
-        g.approach_speed_mm_s = between(&random, 0.0, 1.0) < 0.6 ? 0.0 : over(&random, 0.5, 10.0);
+        g.torque_limit_nm = homing_between(&random, 4.0, 8.0);
+        g.approach_speed_mm_s = homing_between(&random, 0.0, 1.0) < 0.6 ? 0.0 : homing_over(&random, 0.5, 10.0);
         homing_outcome o = homing_run(&c, &g);
         assert_true(o.most_torque_nm <= g.torque_limit_nm + 1e-9 && o.most_travel_mm <= g.distance_max_mm);
         assert_true(o.limit_nm == c.torque_limit_nm);

@@ -35,6 +35,7 @@
  *
  * THREADS
  *   Each comment ends in tags: [thread: setup|cycle|any] [real-time: yes|no] [state: ...].
+ *   cycle: the real-time thread, between two steps. setup: a thread that may wait, while no other uses the instance.
  *   One instance is used by one thread at a time; different instances may be used by different threads.
  *
  * REAL TIME
@@ -2207,11 +2208,11 @@ typedef struct gib_homing_config {
      */
     double detection_time_s;
     /**
-     * Smallest way to the stop, 0 (default) to `distance_max_mm`: a stop before it is a fault.
+     * Smallest way from the start to the stop, 0 (default) to `distance_max_mm`: a stop before it is a fault.
      */
     double distance_min_mm;
     /**
-     * Largest way that the axis may go toward the stop, 0.001 to 100000 mm. Required.
+     * Largest way that the axis may go toward the stop from where it stands at the start, 0.001 to 100000 mm. Required.
      */
     double distance_max_mm;
     /**
@@ -2235,7 +2236,8 @@ typedef struct gib_homing_config {
      */
     double zero_offset_speed_mm_s;
     /**
-     * Way back from the stop between touches, 0.05 to 100 mm (default 1). More than twice the lost motion.
+     * Way back from the stop between touches, 0.05 to 100 mm (default 1). More than twice the lost motion. At the start the axis must
+     * stand further from the stop than that, else `GIB_ERR_HOMING_ON_STOP`.
      */
     double retract_mm;
     /**
@@ -2269,7 +2271,8 @@ typedef struct gib_homing_config {
  */
 typedef struct gib_homing_input {
     /**
-     * Motor position in load units, mm, in the coordinate of the start until GIB_DONE.
+     * Motor position in load units, mm, in the coordinate of the start; from the request to set the position on, either in that or
+     * with `shift_mm` added.
      */
     double position_mm[2];
     /**
@@ -2321,7 +2324,8 @@ typedef struct gib_homing_output {
      */
     int32_t phase;
     /**
-     * Message number: 0, or the error to tell the operator about; its text is `gib_status_text`.
+     * Message number: 0, or the error to tell the operator about, from the cycle on in which it is found; its text is
+     * `gib_status_text`. `GIB_ERR_RESTORE_UNCONFIRMED` after an end without the old torque limit, which is then still asked for.
      */
     int32_t message;
     /**
@@ -2329,7 +2333,8 @@ typedef struct gib_homing_output {
      */
     int32_t owns_motion;
     /**
-     * `GIB_HOMING_EVENT_…` that happened so far in this homing; each happens once, in the order of the numbers.
+     * `GIB_HOMING_EVENT_…` that happened so far in this homing; each happens once, in the order of the numbers. With
+     * `GIB_HOMING_INSTANT_LAG_REDUCTION` no clearing is requested nor acknowledged.
      */
     uint32_t events;
     /**
@@ -2346,7 +2351,8 @@ typedef struct gib_homing_output {
      */
     uint32_t request_id;
     /**
-     * 1: position or drive cannot be trusted; take the torque off the motor and brake it, until the next start.
+     * 1: position or drive cannot be trusted; take the torque off all motors and brake them, until the next start. What is
+     * commanded no longer counts then; requests still do.
      */
     int32_t stop_drive;
     /**
@@ -2364,7 +2370,7 @@ typedef struct gib_homing_side {
      */
     double contact_mm;
     /**
-     * Its expanded uncertainty, k = 2, µm.
+     * Its expanded uncertainty, k = 2, µm; what it holds and what not is told in docs/homing.md.
      */
     double uncertainty_um;
     /**
@@ -2422,7 +2428,7 @@ typedef struct gib_homing_report {
      */
     int32_t method;
     /**
-     * Measured touches so far.
+     * Touches measured so far.
      */
     int32_t touches;
     /**
@@ -5076,6 +5082,11 @@ int32_t gib_homing_start(struct gib_homing *handle,
  * instant. When `request_id` changes, carry out `requests`, then report the number in `acknowledged_id`, and in
  * `torque_limit` the limit in force. Take the torque off the motors while `stop_drive` is 1.
  *
+ * A fault is named in `message` in the cycle in which it is found. Then gib brakes, goes back from what is pressed on, and gives the
+ * old torque limit back; while that goes on the status is GIB_BUSY, and only then the error. It takes at most, in seconds:
+ * 5·(speed + approach speed) ÷ acceleration, (lag limit + `press_max_mm`) ÷ approach speed, four detection times and twice
+ * `ack_timeout_s`, together.
+ *
  * @param handle the instance.
  * @param input measured values of this cycle.
  * @param output commands for this cycle; always written when not NULL.
@@ -5122,7 +5133,8 @@ int32_t gib_homing_abort(struct gib_homing *handle);
 int32_t gib_homing_result(const struct gib_homing *handle, struct gib_homing_report *report);
 
 /**
- * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ * The first error of the present run, or why the last start was refused: code, field, value and bounds. A start refused
+ * with GIB_ERR_STATE, while a homing runs, changes nothing here.
  *
  * @param handle the instance.
  * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
@@ -5133,7 +5145,8 @@ int32_t gib_homing_result(const struct gib_homing *handle, struct gib_homing_rep
  * # Safety
  * `handle` is NULL or an instance; `detail` is NULL or writable.
  */
-int32_t gib_homing_last_error(const struct gib_homing *handle, struct gib_error_detail *detail);
+int32_t gib_homing_last_error(const struct gib_homing *handle,
+                              struct gib_error_detail *detail);
 
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
@@ -5252,7 +5265,8 @@ int32_t gib_inertia_result(struct gib_inertia *handle,
                            struct gib_inertia_report *report);
 
 /**
- * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
+ * GIB_ERR_STATE changes nothing here.
  *
  * @param handle the instance.
  * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
@@ -5263,7 +5277,8 @@ int32_t gib_inertia_result(struct gib_inertia *handle,
  * # Safety
  * `handle` is NULL or an instance; `detail` is NULL or writable.
  */
-int32_t gib_inertia_last_error(const struct gib_inertia *handle, struct gib_error_detail *detail);
+int32_t gib_inertia_last_error(const struct gib_inertia *handle,
+                               struct gib_error_detail *detail);
 
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
@@ -5956,6 +5971,9 @@ int32_t gib_speed_variation_start(struct gib_speed_variation *handle,
  * is cut to what it can, and `message` says why. What a change leads to is worked out over the cycles that follow, a piece in
  * each: it takes effect within 10 cycles, and until then the variation goes on as before. Cutting torque counts at once.
  *
+ * A fault is named in `message` in its cycle; the speed then goes back to its mean as after GIB_SPEED_VARIATION_STOP, with status
+ * GIB_BUSY, and only then the error is returned. After a drive fault gib lets go at once.
+ *
  * @param handle the instance.
  * @param input what is asked for in this cycle.
  * @param output command for this cycle; always written when not NULL.
@@ -6018,7 +6036,8 @@ int32_t gib_speed_variation_possible(const struct gib_speed_variation_config *co
                                      struct gib_speed_variation_limits *limits);
 
 /**
- * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
+ * GIB_ERR_STATE changes nothing here.
  *
  * @param handle the instance.
  * @param detail receives it; its `code` is GIB_OK when nothing went wrong.

@@ -7,7 +7,7 @@ use crate::cycle::homing::io::{GIB_HOMING_FAILED, HomingInput, HomingOutput};
 use crate::cycle::homing::machine::Homing;
 use crate::cycle::homing::plan::Plan;
 use crate::cycle::homing::verdict::HomingReport;
-use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_OK};
+use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_ERR_STATE, GIB_OK};
 use core::ffi::c_void;
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
@@ -59,7 +59,10 @@ fn refusable(handle: &mut GibHoming, call: impl FnOnce(&mut Homing) -> Result<()
             GIB_OK
         }
         Err(fault) => {
-            handle.last = fault;
+            // While busy the error that counts is the run's.
+            if fault.code != GIB_ERR_STATE {
+                handle.last = fault;
+            }
             fault.code
         }
     }
@@ -149,6 +152,11 @@ pub unsafe extern "C" fn gib_homing_start(handle: *mut GibHoming, config: *const
 /// While `owns_motion` is 1, follow `target_position_mm` and report each motor's position and torque of the same
 /// instant. When `request_id` changes, carry out `requests`, then report the number in `acknowledged_id`, and in
 /// `torque_limit` the limit in force. Take the torque off the motors while `stop_drive` is 1.
+///
+/// A fault is named in `message` in the cycle in which it is found. Then gib brakes, goes back from what is pressed on, and gives the
+/// old torque limit back; while that goes on the status is GIB_BUSY, and only then the error. It takes at most, in seconds:
+/// 5·(speed + approach speed) ÷ acceleration, (lag limit + `press_max_mm`) ÷ approach speed, four detection times and twice
+/// `ack_timeout_s`, together.
 ///
 /// @param handle the instance.
 /// @param input measured values of this cycle.
@@ -308,7 +316,8 @@ pub unsafe extern "C" fn gib_homing_result(handle: *const GibHoming, report: *mu
     })
 }
 
-/// The first error of the present run, or why the last call was refused: code, field, value and bounds.
+/// The first error of the present run, or why the last start was refused: code, field, value and bounds. A start refused
+/// with GIB_ERR_STATE, while a homing runs, changes nothing here.
 ///
 /// @param handle the instance.
 /// @param detail receives it; its `code` is GIB_OK when nothing went wrong.

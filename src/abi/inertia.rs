@@ -7,7 +7,7 @@ use crate::cycle::inertia::io::{GIB_INERTIA_FAILED, InertiaInput, InertiaOutput}
 use crate::cycle::inertia::machine::Inertia;
 use crate::cycle::inertia::plan::Plan;
 use crate::cycle::inertia::report::InertiaReport;
-use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_OK};
+use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_ERR_STATE, GIB_OK};
 use core::ffi::c_void;
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
@@ -35,8 +35,12 @@ impl super::guard::Instance for GibInertia {
 
 /// Keeps the reason of a refusal for `_last_error`.
 fn kept(handle: &mut GibInertia, outcome: Result<(), Fault>) -> i32 {
-    handle.last = outcome.err().unwrap_or(Fault::NONE);
-    handle.last.code
+    let fault = outcome.err().unwrap_or(Fault::NONE);
+    // That a call comes at the wrong time must not hide why the run failed.
+    if fault.code != GIB_ERR_STATE {
+        handle.last = fault;
+    }
+    fault.code
 }
 
 /// Bytes that an instance needs in memory of your own, to be aligned to 16.
@@ -248,7 +252,8 @@ pub unsafe extern "C" fn gib_inertia_result(handle: *mut GibInertia, report: *mu
     })
 }
 
-/// The first error of the present run, or why the last call was refused: code, field, value and bounds.
+/// The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
+/// GIB_ERR_STATE changes nothing here.
 ///
 /// @param handle the instance.
 /// @param detail receives it; its `code` is GIB_OK when nothing went wrong.

@@ -6,7 +6,7 @@ use crate::cycle::speed_variation::config::{SpeedVariationConfig, SpeedVariation
 use crate::cycle::speed_variation::io::{GIB_SPEED_VARIATION_FAILED, SpeedVariationInput, SpeedVariationOutput};
 use crate::cycle::speed_variation::machine::SpeedVariation;
 use crate::cycle::speed_variation::plan::Plan;
-use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_OK};
+use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_ERR_STATE, GIB_OK};
 use core::ffi::c_void;
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
@@ -34,8 +34,12 @@ impl super::guard::Instance for GibSpeedVariation {
 
 /// Keeps the reason of a refusal for `_last_error`.
 fn kept(handle: &mut GibSpeedVariation, outcome: Result<(), Fault>) -> i32 {
-    handle.last = outcome.err().unwrap_or(Fault::NONE);
-    handle.last.code
+    let fault = outcome.err().unwrap_or(Fault::NONE);
+    // That a call comes at the wrong time must not hide why the run failed.
+    if fault.code != GIB_ERR_STATE {
+        handle.last = fault;
+    }
+    fault.code
 }
 
 /// Bytes that an instance needs in memory of your own, to be aligned to 16.
@@ -128,6 +132,9 @@ pub unsafe extern "C" fn gib_speed_variation_start(
 /// any cycle; torque, power and speed stay within the motor's. Where more is asked for than it can do, the amplitude
 /// is cut to what it can, and `message` says why. What a change leads to is worked out over the cycles that follow, a piece in
 /// each: it takes effect within 10 cycles, and until then the variation goes on as before. Cutting torque counts at once.
+///
+/// A fault is named in `message` in its cycle; the speed then goes back to its mean as after GIB_SPEED_VARIATION_STOP, with status
+/// GIB_BUSY, and only then the error is returned. After a drive fault gib lets go at once.
 ///
 /// @param handle the instance.
 /// @param input what is asked for in this cycle.
@@ -285,7 +292,8 @@ pub unsafe extern "C" fn gib_speed_variation_possible(
     })
 }
 
-/// The first error of the present run, or why the last call was refused: code, field, value and bounds.
+/// The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
+/// GIB_ERR_STATE changes nothing here.
 ///
 /// @param handle the instance.
 /// @param detail receives it; its `code` is GIB_OK when nothing went wrong.

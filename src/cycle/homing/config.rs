@@ -61,9 +61,9 @@ pub struct HomingConfig {
     pub detection_velocity_mm_s: f64,
     /// Time for which the torque must be limiting and the axis stand, 8 cycles to 5 s (default 0.1).
     pub detection_time_s: f64,
-    /// Smallest way to the stop, 0 (default) to `distance_max_mm`: a stop before it is a fault.
+    /// Smallest way from the start to the stop, 0 (default) to `distance_max_mm`: a stop before it is a fault.
     pub distance_min_mm: f64,
-    /// Largest way that the axis may go toward the stop, 0.001 to 100000 mm. Required.
+    /// Largest way that the axis may go toward the stop from where it stands at the start, 0.001 to 100000 mm. Required.
     pub distance_max_mm: f64,
     /// Time for the whole homing, a cycle to 100000 s (default: what its ways take, twice, and 10 s).
     pub time_limit_s: f64,
@@ -75,7 +75,8 @@ pub struct HomingConfig {
     pub zero_offset_mm: f64,
     /// Speed of that move, 0.01 to 500 mm/s (default: the approach speed).
     pub zero_offset_speed_mm_s: f64,
-    /// Way back from the stop between touches, 0.05 to 100 mm (default 1). More than twice the lost motion.
+    /// Way back from the stop between touches, 0.05 to 100 mm (default 1). More than twice the lost motion. At the start the axis must
+    /// stand further from the stop than that, else `GIB_ERR_HOMING_ON_STOP`.
     pub retract_mm: f64,
     /// Largest way from contact to the torque limit, 0.0001 mm to 0.4 of the retraction (default): more is a soft stop.
     pub press_max_mm: f64,

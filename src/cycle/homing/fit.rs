@@ -25,6 +25,7 @@ const FEWEST: f64 = 6.0;
 /// random axes the contact found with 0.13 lies 0.15 µm off in the mean, with 0.2 nothing.
 const LINE_FROM: f64 = 0.2;
 const LINE_TO: f64 = 0.95;
+const LINE_HALF: f64 = 0.5 * (LINE_FROM + LINE_TO);
 /// The level ends this share of the line's length before the corner.
 const LEVEL_GAP: f64 = 0.1;
 
@@ -48,6 +49,12 @@ impl Sums {
         self.xx += weight * x * x;
         self.xt += weight * x * t;
         self.tt += weight * t * t;
+    }
+
+    /// Both together.
+    fn and(&self, other: &Sums) -> Sums {
+        let [a, b] = [self, other];
+        Sums { n: a.n + b.n, x: a.x + b.x, t: a.t + b.t, xx: a.xx + b.xx, xt: a.xt + b.xt, tt: a.tt + b.tt }
     }
 
     /// Squares of t about its mean.
@@ -86,6 +93,11 @@ pub struct Contact {
     pub stiffness_error: f64,
     /// Standard deviation of a block about level and line.
     pub noise: f64,
+    /// By how much later the line starts as its upper half has it than as its lower half has it, and the variance of that: a stop that
+    /// stiffens with the force, or an impact that is over late, bends the line.
+    pub bend: f64,
+    /// See `bend`.
+    pub bend_variance: f64,
     /// Way that a torque which swings before contact, as of an axis that sticks and slips, may hide.
     pub swing: f64,
     /// Way from contact to where the torque limit was reached.
@@ -124,6 +136,8 @@ pub struct Fit {
     early: Sums,
     level: Sums,
     line: Sums,
+    /// Lower half of the line.
+    low: Sums,
     /// From block to block of the line, and its last block.
     steps: Sums,
     before: Option<(f64, f64)>,
@@ -150,6 +164,7 @@ impl Default for Fit {
             early: Sums::default(),
             level: Sums::default(),
             line: Sums::default(),
+            low: Sums::default(),
             steps: Sums::default(),
             before: None,
             level_steps: 0.0,
@@ -159,6 +174,13 @@ impl Default for Fit {
             found: None,
         }
     }
+}
+
+/// Where a line of that slope through the middle of its blocks leaves the level, and the variance of that.
+fn start_of(line: &Sums, level: f64, slope: f64, scatter: f64) -> (f64, f64) {
+    let mean = line.x / line.n;
+    let way = mean - (line.t / line.n - level) / slope;
+    (way, scatter * (1.0 / line.n + (mean - way) * (mean - way) / line.spread().0) / (slope * slope))
 }
 
 impl Fit {
@@ -261,7 +283,8 @@ impl Fit {
             }
             self.level_before = Some(block);
         } else if along >= LINE_FROM * length && along <= LINE_TO * length {
-            self.line.add(1.0, block);
+            let half = if along < LINE_HALF * length { &mut self.low } else { &mut self.line };
+            half.add(1.0, block);
             if let Some((x, t)) = self.before {
                 self.steps.add(1.0, (block.0 - x, block.1 - t));
             }
@@ -291,12 +314,17 @@ impl Fit {
         };
     }
 
+    /// Squares of the steps from block to block about a line of that slope.
+    fn from_block_to_block(&self, slope: f64) -> f64 {
+        let s = &self.steps;
+        (s.tt - 2.0 * slope * s.xt + slope * slope * s.xx).max(0.0)
+    }
+
     /// By how much the line's variance exceeds that of independent blocks: an axis that swings or sticks and slips on the
     /// stop scatters about its line, but not from block to block (Durbin and Watson's ratio, 2·(1 − ρ)).
     fn hanging_together(&self, slope: f64, about_line: f64) -> f64 {
         const MOST: f64 = 0.7;
-        let (s, scatter) = (&self.steps, about_line.max(f64::MIN_POSITIVE));
-        let ratio = (s.tt - 2.0 * slope * s.xt + slope * slope * s.xx).max(0.0) / scatter;
+        let ratio = self.from_block_to_block(slope) / about_line.max(f64::MIN_POSITIVE);
         let rho = (1.0 - 0.5 * ratio).clamp(0.0, MOST);
         (1.0 + rho) / (1.0 - rho)
     }
@@ -310,11 +338,25 @@ impl Fit {
         PEAK * beyond.max(0.0).sqrt()
     }
 
+    /// Where the two halves of the line start, one less the other, and what of its variance is chance: the noise from block to
+    /// block. Nothing where a half is too short.
+    fn bend(&self, level: f64, slope: f64) -> (f64, f64) {
+        /// Of the whole line's slope; a half that is flatter, as by chance, starts nowhere.
+        const FLATTEST: f64 = 0.2;
+        let chance = 0.5 * self.from_block_to_block(slope) / self.steps.n;
+        let [low, high] = [&self.low, &self.line].map(|half| {
+            let own = half.line().0.max(FLATTEST * slope);
+            start_of(half, level, own, chance)
+        });
+        let bend = (high.0 - low.0, high.1 + low.1);
+        if self.low.n >= 3.0 && self.line.n >= 3.0 && bend.1.is_finite() { bend } else { (0.0, 0.0) }
+    }
+
     /// Contact point and its variance from the refined sums; `None` for a curve that is not a level and a line.
     fn solve(&self) -> Option<Contact> {
         /// Standard errors by which the slope must be above zero.
         const SURE: f64 = 5.0;
-        let (level, line) = (&self.level, &self.line);
+        let (level, line) = (&self.level, &self.low.and(&self.line));
         if !(level.n >= FEWEST && line.n >= FEWEST && self.split.press > 0.0) {
             return None;
         }
@@ -327,17 +369,18 @@ impl Fit {
         if !(slope > SURE * slope_error) {
             return None;
         }
-        let mean = line.x / line.n;
-        let way = mean - (line.t / line.n - torque) / slope;
-        let of_level = level.scatter() / (level.n - 1.0) / level.n;
-        let of_line = about_line / (line.n - 2.0) * (1.0 / line.n + (mean - way) * (mean - way) / sxx);
-        let of_line = of_line * self.hanging_together(slope, about_line);
+        let scatter_line = about_line / (line.n - 2.0) * self.hanging_together(slope, about_line);
+        let (way, of_line) = start_of(line, torque, slope, scatter_line);
+        let of_level = level.scatter() / (level.n - 1.0) / level.n / (slope * slope);
+        let (bend, bend_variance) = self.bend(torque, slope);
         let contact = Contact {
             way,
-            variance: (of_level + of_line) / (slope * slope),
+            variance: of_level + of_line,
             level: torque,
             stiffness: slope,
             stiffness_error: slope_error,
+            bend,
+            bend_variance,
             noise: scatter.sqrt(),
             swing: self.swing() / slope,
             press: (self.threshold - torque) / slope,

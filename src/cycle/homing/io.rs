@@ -55,7 +55,8 @@ pub const GIB_HOMING_REQUEST_SET_POSITION: u32 = 4;
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct HomingInput {
-    /// Motor position in load units, mm, in the coordinate of the start until GIB_DONE.
+    /// Motor position in load units, mm, in the coordinate of the start; from the request to set the position on, either in that or
+    /// with `shift_mm` added.
     pub position_mm: [f64; 2],
     /// Motor torque, positive toward positive positions unless `torque_inverted`, in the unit of the configuration.
     pub torque: [f64; 2],
@@ -85,11 +86,13 @@ pub struct HomingOutput {
     pub status: i32,
     /// One of the `GIB_HOMING_…` phases.
     pub phase: i32,
-    /// Message number: 0, or the error to tell the operator about; its text is `gib_status_text`.
+    /// Message number: 0, or the error to tell the operator about, from the cycle on in which it is found; its text is
+    /// `gib_status_text`. `GIB_ERR_RESTORE_UNCONFIRMED` after an end without the old torque limit, which is then still asked for.
     pub message: i32,
     /// 1 while gib commands the axis, else 0.
     pub owns_motion: i32,
-    /// `GIB_HOMING_EVENT_…` that happened so far in this homing; each happens once, in the order of the numbers.
+    /// `GIB_HOMING_EVENT_…` that happened so far in this homing; each happens once, in the order of the numbers. With
+    /// `GIB_HOMING_INSTANT_LAG_REDUCTION` no clearing is requested nor acknowledged.
     pub events: u32,
     /// Those of this cycle.
     pub new_events: u32,
@@ -98,7 +101,8 @@ pub struct HomingOutput {
     /// Number of the present request: when it changes, carry out `requests`, then give the number back in
     /// `acknowledged_id`. 0: no request was made yet.
     pub request_id: u32,
-    /// 1: position or drive cannot be trusted; take the torque off the motor and brake it, until the next start.
+    /// 1: position or drive cannot be trusted; take the torque off all motors and brake them, until the next start. What is
+    /// commanded no longer counts then; requests still do.
     pub stop_drive: i32,
     /// Zero.
     pub reserved: i32,

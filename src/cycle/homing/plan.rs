@@ -43,7 +43,7 @@ pub struct Plan {
     pub bound_below: f64,
     /// Share of a reading in the filtered torque, with the sign that makes it positive toward the stop.
     pub torque_share: f64,
-    /// Largest change of position in a cycle that motion can explain.
+    /// Largest change of position in a cycle that the present move can explain, see [`Plan::moves_at`].
     pub jump: f64,
     /// N·m per unit of the torque input.
     pub torque_nm: f64,
@@ -179,7 +179,7 @@ impl Plan {
             bound: (limit_nm + tolerance_nm) / torque_nm,
             bound_below: -(limit_nm + tolerance_nm) / torque_nm,
             torque_share: super::side::GAIN * if inverted { -sense } else { sense },
-            jump: 0.01 + 10.0 * approach.max(offset_speed) * cycle,
+            jump: 0.0,
             torque_nm,
             standing_way: slow * detection_s,
             detection: cycles(detection_s),
@@ -202,6 +202,11 @@ impl Plan {
     #[must_use]
     pub fn block(&self, speed: f64) -> u32 {
         (self.window() / (TRACE_BLOCKS * speed)).ceil() as u32
+    }
+
+    /// The axis moves at `speed` (mm per cycle) from now on; where it springs, some times as fast.
+    pub fn moves_at(&mut self, speed: f64) {
+        self.jump = 0.01 + 10.0 * speed;
     }
 
     /// Makes the measured touches slow enough for a line of `press` mm, down to a quarter of their speed.

@@ -24,6 +24,8 @@ const RELIEVED: f64 = 0.2;
 /// Share of the torque at which it counts as limiting that is too much to be left on.
 const LIGHT: f64 = 0.4;
 const RELIEF: f64 = 5.0;
+/// Share of the bound beyond which a torque reading counts as that.
+const BEYOND: f64 = 3.0 / GAIN;
 
 /// How a touch stands after a cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,9 +67,10 @@ pub struct Side {
     pub position: f64,
     /// Torque toward the stop, filtered.
     pub filtered: f64,
-    /// Lowest of it on the way back, and the last while it slid back steadily.
+    /// Lowest of it on the way back.
     pub(super) lowest: f64,
-    pub(super) sliding: f64,
+    /// The last of it while it slid back steadily.
+    pub sliding: f64,
     /// The torque as it was read last, for how many cycles, where the axis was when it last changed, its last change and
     /// the mean of how much that differs from the one before.
     pub(super) reading: f64,
@@ -149,9 +152,12 @@ impl Side {
             && self.filtered.abs() <= plan.bound
     }
 
-    /// Takes in a cycle's readings.
+    /// Takes in a cycle's readings. What no drive can give counts as so much that it breaks the bound in one cycle, and no more:
+    /// the filter must not hold it for long, nor overflow.
     #[inline(always)]
     pub fn sense(&mut self, plan: &Plan, position: f64, torque: f64) {
+        let most = BEYOND * plan.bound;
+        let torque = lower(higher(torque, -most), most);
         if self.frozen == 0 {
             self.free = [self.reading, self.filtered];
         }
@@ -269,8 +275,11 @@ impl Side {
     /// the more there is, so that the servo's integral runs down. True when the torque is off.
     pub fn relieve(&mut self, plan: &Plan) -> bool {
         let off = self.filtered.abs() <= RELIEVED * plan.limit;
-        let speed = -plan.sense * plan.approach * (RELIEF * self.filtered / plan.limit).clamp(-1.0, 1.0);
-        self.profile = Profile::at_rest(self.profile.position + speed, plan.acceleration);
+        let speed = -plan.approach * (RELIEF * self.filtered / plan.limit).clamp(-1.0, 1.0);
+        // A torque that pulls off the stop may lead the command toward it, but not beyond the largest way.
+        let left = plan.reach() - plan.sense * (self.profile.position - self.start);
+        let toward = lower(speed, higher(left, 0.0));
+        self.profile = Profile::at_rest(self.profile.position + plan.sense * toward, plan.acceleration);
         self.standing = if off { self.standing + 1 } else { 0 };
         self.standing >= plan.hold
     }

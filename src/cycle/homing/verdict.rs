@@ -14,7 +14,7 @@ use crate::error::*;
 pub struct HomingSide {
     /// Contact point, mean of the measured touches, in the coordinate of the start, mm.
     pub contact_mm: f64,
-    /// Its expanded uncertainty, k = 2, µm.
+    /// Its expanded uncertainty, k = 2, µm; what it holds and what not is told in docs/homing.md.
     pub uncertainty_um: f64,
     /// Largest minus smallest contact point of the measured touches, µm.
     pub spread_um: f64,
@@ -46,7 +46,7 @@ pub struct HomingReport {
     pub status: i32,
     /// `GIB_HOMING_LINE` or `GIB_HOMING_THRESHOLD`.
     pub method: i32,
-    /// Measured touches so far.
+    /// Touches measured so far.
     pub touches: i32,
     /// Cycles since the start.
     pub cycles: i32,
@@ -70,6 +70,8 @@ pub struct Touches {
     coarse: bool,
     first_level: f64,
     first_press: f64,
+    /// Torque toward the stop while the axis slid back from it, once it did.
+    slides_back: Option<f64>,
     threshold: f64,
     mean: Contact,
 }
@@ -126,6 +128,8 @@ impl Touches {
         self.mean.level += contact.level;
         self.mean.noise += contact.noise;
         self.mean.swing += contact.swing;
+        self.mean.bend += contact.bend;
+        self.mean.bend_variance += contact.bend_variance;
         Ok(())
     }
 
@@ -146,25 +150,48 @@ impl Touches {
         self.mean.swing / self.n.max(1.0)
     }
 
+    /// Half of what the torque changes by between the two ways, which gravity does not.
+    fn friction(&self) -> f64 {
+        self.slides_back.map_or(self.level().abs(), |back| 0.5 * (self.level() - back).abs())
+    }
+
+    /// Takes note of the torque toward the stop with which the axis slid back from a touch; of no number where it did not.
+    pub fn slid_back(&mut self, torque: f64) {
+        if torque.is_finite() {
+            self.slides_back = Some(torque);
+        }
+    }
+
+    /// By how much the line is bent, beyond chance, mean of the measured touches.
+    fn bend(&self) -> f64 {
+        let n = self.n.max(1.0);
+        let chance = 4.0 * self.mean.bend_variance;
+        (self.mean.bend * self.mean.bend - chance).max(0.0).sqrt() / n
+    }
+
     /// Standard deviation of the mean.
     fn deviation(&self, plan: &Plan) -> f64 {
         /// Time in s, as a standard deviation, by which torque and position of an impact differ: current loop, instant of
         /// sampling, swinging. On random axes, most of 0.3 to 4 times the usual inertia, the intervals then hold 94 of 100.
         const IMPACT_S: f64 = 0.4e-3;
-        /// The same for friction, as a share of the torque before contact: on the stop the table comes to rest, where friction
+        /// The same for friction, as a share of it: on the stop the table comes to rest, where friction
         /// is not what it was under way (Stribeck). On random axes whose friction rises by up to 1.8 times toward rest, 0.03
         /// to 0.05 is most likely.
         const FRICTION: f64 = 0.04;
+        /// The same for a bent line, as a share of where its halves start: of a ball or a pad, whose force rises with the way to the
+        /// power of 1.5 or 2, the line starts late by 2.1 or 2.7 times that.
+        const BENT: f64 = 1.4;
         let n = self.n.max(1.0);
         let expected = self.variances / n;
         let shown = (self.squares - self.sum * self.sum / n).max(0.0) / (n - 1.0).max(1.0);
         let impact = IMPACT_S * plan.touch * plan.cycles_per_s;
         let swing = self.swing();
-        let friction = FRICTION * self.mean.level / self.mean.stiffness.max(f64::MIN_POSITIVE);
+        let friction = FRICTION * self.friction() / self.stiffness().max(f64::MIN_POSITIVE);
         // A line that takes less time than the impact swings is impact for the rest of it.
         let press = self.mean.press / n;
         let short = (press - press * press / (LINE_S * plan.cycles_per_s * plan.touch)).max(0.0);
-        let shared = [impact, swing, friction, short].iter().fold(0.0, |sum, part| sum + part * part);
+        let bend = BENT * self.bend();
+        let shared = [impact, swing, friction, short, bend].iter().fold(0.0, |sum, part| sum + part * part);
         ((expected + shown) / n + shared).sqrt()
     }
 

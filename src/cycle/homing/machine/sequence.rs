@@ -96,8 +96,14 @@ impl Homing {
         }
     }
 
+    /// Waits, with no torque on the axis: one that comes back, as of a servo on an encoder that stands, is taken off before the drive
+    /// may give more.
     fn restoring(&mut self, input: &HomingInput) {
-        if self.confirmed(input) {
+        let plan = &self.plan;
+        let loaded = self.sides.iter().take(plan.motors).any(|side| side.filtered.abs() > plan.release);
+        if loaded && self.hears() && self.output.stop_drive == 0 {
+            self.stop_drive();
+        } else if self.confirmed(input) {
             self.changed = false;
             self.fail();
         }
@@ -206,8 +212,9 @@ impl Homing {
     fn evaluated(&mut self) {
         let plan = self.plan;
         let back = self.touch < plan.touches;
-        for (side, touches) in self.sides.iter().zip(&self.touches).take(plan.motors) {
-            if let (true, Some(fault)) = (back, side.held_back(&plan, touches.level())) {
+        for (side, touches) in self.sides.iter().zip(&mut self.touches).take(if back { plan.motors } else { 0 }) {
+            touches.slid_back(side.sliding);
+            if let Some(fault) = side.held_back(&plan, touches.level()) {
                 return self.leave(self.or_racked(fault));
             }
         }
@@ -228,6 +235,7 @@ impl Homing {
 
     #[cold]
     fn begin(&mut self, input: &HomingInput) {
+        self.plan.moves_at(self.plan.approach);
         for (side, position) in self.sides.iter_mut().zip(input.position_mm) {
             side.begin(&self.plan, position);
         }
@@ -240,8 +248,9 @@ impl Homing {
     /// Begins the next touch. All but the first end soon behind the stop found before.
     #[cold]
     fn start_touch(&mut self) {
+        let speed = if self.touch == 0 { self.plan.approach } else { self.plan.touch };
+        self.plan.moves_at(speed);
         let plan = &self.plan;
-        let speed = if self.touch == 0 { plan.approach } else { plan.touch };
         for side in self.sides.iter_mut().take(plan.motors) {
             let beyond = side.travel(plan) + plan.retract + plan.press_max + plan.lag_limit;
             let reach = if self.touch == 0 { plan.reach() } else { beyond.min(plan.reach()) };
@@ -319,6 +328,7 @@ impl Homing {
     /// All touches are evaluated: do they agree, and where is home?
     #[cold]
     fn conclude(&mut self) {
+        self.plan.moves_at(self.plan.offset_speed.max(self.plan.touch));
         let plan = self.plan;
         for i in 0..plan.motors.min(2) {
             if let Err(fault) = self.touches[i].agree(&plan) {
@@ -380,6 +390,7 @@ impl Homing {
     /// Standing: goes back from whatever was pressed on, by the way that pressing may have wound up.
     #[cold]
     fn unload(&mut self) {
+        self.plan.moves_at(self.plan.approach.max(self.plan.offset_speed));
         let plan = self.plan;
         let mut bound = 0f64;
         if self.sides.iter().take(plan.motors).any(Side::dead) {

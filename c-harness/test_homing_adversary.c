@@ -1,0 +1,59 @@
+/*
+ * Homing against somebody who means it ill: random axes, configurations and troubles, see homing_adversary.h. The seed is fresh
+ * and printed; another one, and how many runs: test_homing_adversary SEED [RUNS]. A run by itself: SEED as printed for it, 1.
+ */
+#include "homing_adversary.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+#include <cmocka.h>
+
+static uint64_t seed;
+static int runs = 500;
+
+static void describe(const homing_adversary *a, uint64_t its_seed)
+{
+    print_message("seed %llu: %s, cycle %d of %d (named in %d); %s\n", (unsigned long long)its_seed,
+                  a->broken ? a->broken : "well", a->broken_at, a->ended, a->named, gib_status_text(a->world.status));
+    print_message("    %d motors, cycle %g ms\n", a->world.plant.c.motors, 1e3 * a->world.plant.c.cycle_s);
+    for (int i = 0; i < a->troubles; i++) {
+        const homing_trouble *t = &a->trouble[i];
+        print_message("    %s, side %d, in %s after %d for %d: began in %d\n", homing_trouble_name(t->kind), t->side,
+                      homing_state_names[t->state], t->after, t->lasts, t->begun);
+    }
+}
+
+static void every_law_holds(void **state)
+{
+    (void)state;
+    static homing_adversary a;
+    int broken = 0, homed = 0, met = 0;
+    for (int i = 0; i < runs; i++) {
+        homing_adversary_init(&a, seed + (uint64_t)i);
+        homing_adversary_run(&a);
+        homed += a.world.status == GIB_DONE;
+        for (int k = 0; k < a.troubles; k++) {
+            met += a.trouble[k].begun != 0;
+        }
+        broken += a.broken != NULL;
+        if (a.broken) {
+            describe(&a, seed + (uint64_t)i);
+        }
+    }
+    print_message("seed %llu: %d runs, %d troubles met, %d homed, %d broke a law\n", (unsigned long long)seed, runs, met,
+                  homed, broken);
+    assert_int_equal(broken, 0);
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(every_law_holds)};
+    seed = argc > 1 ? strtoull(argv[1], NULL, 10) : (uint64_t)time(NULL) * 1000u;
+    runs = argc > 2 ? atoi(argv[2]) : runs;
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
