@@ -315,7 +315,7 @@ impl Fit {
     }
 
     /// Squares of the steps from block to block about a line of that slope.
-    fn from_block_to_block(&self, slope: f64) -> f64 {
+    fn block_to_block(&self, slope: f64) -> f64 {
         let s = &self.steps;
         (s.tt - 2.0 * slope * s.xt + slope * slope * s.xx).max(0.0)
     }
@@ -324,7 +324,7 @@ impl Fit {
     /// stop scatters about its line, but not from block to block (Durbin and Watson's ratio, 2·(1 − ρ)).
     fn hanging_together(&self, slope: f64, about_line: f64) -> f64 {
         const MOST: f64 = 0.7;
-        let ratio = self.from_block_to_block(slope) / about_line.max(f64::MIN_POSITIVE);
+        let ratio = self.block_to_block(slope) / about_line.max(f64::MIN_POSITIVE);
         let rho = (1.0 - 0.5 * ratio).clamp(0.0, MOST);
         (1.0 + rho) / (1.0 - rho)
     }
@@ -343,7 +343,7 @@ impl Fit {
     fn bend(&self, level: f64, slope: f64) -> (f64, f64) {
         /// Of the whole line's slope; a half that is flatter, as by chance, starts nowhere.
         const FLATTEST: f64 = 0.2;
-        let chance = 0.5 * self.from_block_to_block(slope) / self.steps.n;
+        let chance = 0.5 * self.block_to_block(slope) / self.steps.n;
         let [low, high] = [&self.low, &self.line].map(|half| {
             let own = half.line().0.max(FLATTEST * slope);
             start_of(half, level, own, chance)
