@@ -99,6 +99,7 @@ fn what_was_found_and_simulated_again_is_no_discrepancy() {
     let spring = Effect::DriveCompliance {
         resonance_hz: 55.0,
         stiffness_n_um: 30.0,
+        table_inertia_share: 0.5,
         table_friction_share: 0.7,
         damping_ratio: 0.05,
     };

@@ -73,6 +73,7 @@ fn two_masses_swing_at_their_resonance_and_keep_momentum_and_energy() {
     let compliance = Effect::DriveCompliance {
         resonance_hz: 80.0,
         stiffness_n_um: 60.0,
+        table_inertia_share: 0.5,
         table_friction_share: 0.5,
         damping_ratio: 0.0,
     };
@@ -204,6 +205,7 @@ fn every_cause_of_torque_is_predicted() {
         Effect::DriveCompliance {
             resonance_hz: 32.0,
             stiffness_n_um: 10.0,
+            table_inertia_share: 0.5,
             table_friction_share: 0.5,
             damping_ratio: 0.05,
         },

@@ -27,6 +27,7 @@ fn main() -> ExitCode {
         Effect::DriveCompliance {
             resonance_hz: 60.0,
             stiffness_n_um: 30.0,
+            table_inertia_share: 0.5,
             table_friction_share: 0.5,
             damping_ratio: 0.05,
         },

@@ -79,6 +79,7 @@ fn on_inertia(axis: &Axis, effect: Effect, inertia: f64) -> Effect {
         Effect::DriveCompliance { stiffness_n_um, table_friction_share, .. } => Effect::DriveCompliance {
             resonance_hz: omega / TAU,
             stiffness_n_um,
+            table_inertia_share: m.table_inertia / inertia,
             table_friction_share,
             damping_ratio: 0.5 * m.damping * omega / m.stiffness,
         },
@@ -138,6 +139,7 @@ mod tests {
         let spring = Effect::DriveCompliance {
             resonance_hz: 60.0,
             stiffness_n_um: 30.0,
+            table_inertia_share: 0.5,
             table_friction_share: 0.7,
             damping_ratio: 0.05,
         };

@@ -151,12 +151,16 @@ vocabulary! {
         /// How stiff the flanks meet: the frequency of motor against table while they touch, Hz; drive_compliance overrules it.
         contact_hz: "contact_hz", "contact_hz", "", 1.0, 1e5, = 700.0;
     }
-    /// Elastic drive. The frequency is that of the two free masses, √(k·(1/J₁+1/J₂))/2π, the table the lighter one.
+    /// Elastic drive. The frequency is that of the two free masses, √(k·(1/J₁+1/J₂))/2π: with the stiffness it gives both masses,
+    /// but not which of them is the table.
     DriveCompliance "drive_compliance" once "elastic drive: resonance between motor and table" {
         /// Resonance of motor against table, Hz.
         resonance_hz: "resonance_hz", "resonance_hz", "", TINY, HUGE;
         /// Stiffness between motor and table, at the table.
         stiffness_n_um: "stiffness_n_um", "stiffness_n_um", "", TINY, HUGE;
+        /// Share of the inertia on the table's side: above a half the table is the heavier mass, else the lighter one; the share
+        /// itself follows from resonance and stiffness.
+        table_inertia_share: "table_inertia_share", "table_inertia_share", "", 0.0, 1.0, = 0.5;
         /// Share of Coulomb, viscous and the other friction that is on the table's side.
         table_friction_share: "table_friction_share", "table_friction_share", "", 0.0, 1.0, = 0.5;
         /// Damping ratio of that resonance.

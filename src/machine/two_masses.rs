@@ -42,18 +42,24 @@ impl Axis {
                     let clearance = width_um * self.drive.motor_per_um();
                     backlash = Some((clearance, table_inertia_share, table_friction_share, TAU * contact_hz));
                 }
-                Effect::DriveCompliance { resonance_hz, stiffness_n_um, table_friction_share, damping_ratio } => {
-                    compliance = Some((TAU * resonance_hz, stiffness_n_um, table_friction_share, damping_ratio));
-                }
+                Effect::DriveCompliance { .. } => compliance = Some(effect),
                 _ => {}
             }
         }
         let clearance = backlash.map_or(0.0, |(clearance, _, _, _)| clearance);
-        if let Some((omega, stiffness_n_um, table_friction_share, damping_ratio)) = compliance {
+        if let Some(&Effect::DriveCompliance {
+            resonance_hz,
+            stiffness_n_um,
+            table_inertia_share,
+            table_friction_share,
+            damping_ratio,
+        }) = compliance
+        {
+            let omega = TAU * resonance_hz;
             let stiffness = self.drive.motor_stiffness(stiffness_n_um);
             let root = 1.0 - 4.0 * stiffness / (inertia * omega * omega);
-            // A hair below zero is rounding of equal masses.
-            if root < -1e-9 {
+            // A hair below zero is rounding of equal masses, whose frequency has four digits or more.
+            if root < -1e-3 {
                 let least = (4.0 * stiffness / inertia).sqrt() / TAU;
                 return Err(format!(
                     "drive_compliance: resonance_hz {:.4} is too low for {stiffness_n_um} N/µm and the axis's inertia; \
@@ -61,7 +67,8 @@ impl Axis {
                     omega / TAU
                 ));
             }
-            let table_inertia = 0.5 * inertia * (1.0 - root.max(0.0).sqrt());
+            let apart = root.max(0.0).sqrt() * if table_inertia_share > 0.5 { 1.0 } else { -1.0 };
+            let table_inertia = 0.5 * inertia * (1.0 + apart);
             let motor_inertia = inertia - table_inertia;
             let damping = 2.0 * damping_ratio * stiffness / omega;
             return Ok(Some(TwoMasses {
@@ -105,6 +112,29 @@ mod tests {
         // Damping ratio of the relative motion: d·(1/J1 + 1/J2)/(2ω).
         let ratio = m.damping * (1.0 / m.motor_inertia + 1.0 / m.table_inertia) / (2.0 * TAU * 90.0);
         assert!((ratio - 0.05).abs() < 1e-9, "{ratio}");
+    }
+
+    #[test]
+    fn the_table_is_the_heavier_mass_where_its_share_says_so() {
+        let share = |told: &str| {
+            let effect = format!(
+                r#"{{"cause":"drive_compliance","parameters":{{"resonance_hz":90,"stiffness_n_um":80{told}}}}}"#
+            );
+            axis(&effect).unwrap().two_masses().unwrap().unwrap().table_inertia / 0.003
+        };
+        let light = share("");
+        assert!(light < 0.5 && share(r#","table_inertia_share":0.5"#) == light);
+        assert!((share(r#","table_inertia_share":0.6"#) - (1.0 - light)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn equal_masses_may_be_rounded() {
+        let at = |hz: f64| {
+            axis(&format!(r#"{{"cause":"drive_compliance","parameters":{{"resonance_hz":{hz},"stiffness_n_um":80}}}}"#))
+        };
+        let equal = (4.0 * axis("").unwrap().drive.motor_stiffness(80.0) / 0.003).sqrt() / TAU;
+        let masses = at((equal * 1e3).floor() / 1e3).unwrap().two_masses().unwrap().unwrap();
+        assert!((masses.table_inertia / masses.motor_inertia - 1.0).abs() < 1e-9 && at(0.99 * equal).is_err());
     }
 
     #[test]

@@ -114,7 +114,7 @@ impl Effect {
                 (3e-3, 0.06, 0.5)
             }
             "drive_compliance" => {
-                form = [r.uniform(0.2, 0.5), r.uniform(0.5, 0.9), r.uniform(0.01, 0.08)];
+                form = [r.uniform(0.2, 0.8), r.uniform(0.5, 0.9), r.uniform(0.01, 0.08)];
                 let fastest = (0.12 / rig.servo.period).min(150.0);
                 (1.0 / fastest.powi(2), 1.0 / 15f64.powi(2), 1.0)
             }
@@ -268,6 +268,7 @@ impl Effect {
                 vec![
                     scored("resonance_hz", self.amount.powf(-0.5)),
                     scored("stiffness_n_um", newton_per_um),
+                    extra("table_inertia_share", form[0]),
                     extra("table_friction_share", form[1]),
                     extra("damping_ratio", form[2]),
                 ]

@@ -17,7 +17,7 @@ pub static LAW: Law = Law {
     cause: Cause::DriveCompliance,
     scales: &[
         Scale::Log(3.0, 2000.0),
-        Scale::Linear(0.04, 0.5, 0.01),
+        Scale::Linear(0.04, 0.95, 0.01),
         Scale::Linear(0.02, 0.98, 0.02),
         Scale::Log(2e-3, MOST_DAMPING),
     ],
@@ -52,9 +52,15 @@ pub static LAW: Law = Law {
 };
 
 fn effect(frame: &Frame, shape: &[f64]) -> Option<Effect> {
-    let [resonance_hz, share, table_friction_share, damping_ratio] = shape.try_into().ok()?;
+    let [resonance_hz, table_inertia_share, table_friction_share, damping_ratio] = shape.try_into().ok()?;
     let omega: f64 = TAU * resonance_hz;
-    let stiffness = omega * omega * frame.belief.inertia * share * (1.0 - share);
+    let stiffness = omega * omega * frame.belief.inertia * table_inertia_share * (1.0 - table_inertia_share);
     let stiffness_n_um = stiffness / frame.axis.drive.motor_stiffness(1.0);
-    Some(Effect::DriveCompliance { resonance_hz, stiffness_n_um, table_friction_share, damping_ratio })
+    Some(Effect::DriveCompliance {
+        resonance_hz,
+        stiffness_n_um,
+        table_inertia_share,
+        table_friction_share,
+        damping_ratio,
+    })
 }
