@@ -11,6 +11,7 @@ use gib::plant::added::Added;
 use gib::plant::closed_loop::predict;
 use gib::plant::linear;
 use gib::plant::observed::Observed;
+use gib::plant::servo::CommandSpeed;
 use gib::recording::{Recording, Signal};
 use serde_json::{Map, Value, json};
 
@@ -70,6 +71,7 @@ struct Predicted<'a> {
     phases_unknown: usize,
     position: Option<Vec<f64>>,
     added: Option<Added>,
+    command_speed: CommandSpeed,
 }
 
 impl<'a> Predicted<'a> {
@@ -78,7 +80,8 @@ impl<'a> Predicted<'a> {
         let prediction = predict(axis, &observed)?;
         let position = prediction.closed_loop.map(|replayed| replayed.position);
         let (torque, phases_unknown) = (prediction.torque.torque, prediction.torque.phases_unknown);
-        Ok(Self { axis, observed, torque, phases_unknown, position, added: prediction.added })
+        let (added, command_speed) = (prediction.added, prediction.command_speed);
+        Ok(Self { axis, observed, torque, phases_unknown, position, added, command_speed })
     }
 
     fn residual(&self) -> impl Iterator<Item = f64> {
@@ -95,6 +98,7 @@ impl<'a> Predicted<'a> {
             moving: rms(moving.map(|(residual, _)| residual)),
             position_um: self.position.as_ref().map(|p| 1e3 * rms(p.iter().zip(measured).map(|(p, m)| m - p))),
             added: self.added.as_ref().map_or((0, 0.0), |added| (added.pulses, added.largest)),
+            command_speed: self.command_speed,
             cutoff_hz: self.observed.motion.cutoff_hz,
         }
     }
@@ -108,6 +112,7 @@ struct Figures {
     position_um: Option<f64>,
     /// Pulses of torque that were added to the servo's, and the largest.
     added: (usize, f64),
+    command_speed: CommandSpeed,
     cutoff_hz: f64,
 }
 
@@ -115,7 +120,7 @@ impl Figures {
     fn json(&self) -> Value {
         json!({ "torque_rms": self.torque, "residual_torque_rms": self.residual, "residual_torque_rms_moving": self.moving,
             "residual_position_rms_um": self.position_um, "added_torque_pulses": self.added.0,
-            "added_torque_largest": self.added.1, "motion_cutoff_hz": self.cutoff_hz })
+            "added_torque_largest": self.added.1, "command_speed": self.command_speed.name(), "motion_cutoff_hz": self.cutoff_hz })
     }
 
     fn text(&self, predicted: &Predicted<'_>, text: &mut String) {
@@ -137,6 +142,13 @@ impl Figures {
                 text,
                 "  {pulses} pulses of {word}, the largest {largest:.4} {unit}, are in the recording beyond what the servo's law makes of \
                  it;\n  the closed loop was given them"
+            );
+        }
+        if self.command_speed != CommandSpeed::Central {
+            let _ = writeln!(
+                text,
+                "  the control takes the {} difference of its command for its speed, as the recorded {word} says",
+                self.command_speed.name()
             );
         }
         let _ = writeln!(text, "  speed and acceleration up to {cutoff_hz:10.1} Hz, where motion meets noise");

@@ -101,7 +101,7 @@ impl Simulate {
                 torque_noise: self.torque_noise,
                 torque_grid: self.torque_grid,
             },
-            start: None,
+            ..Setup::default()
         };
         let trace = simulate(axis, &command, &setup)?;
         write(&self.out, axis, &trace)?;

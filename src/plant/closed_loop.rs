@@ -1,13 +1,14 @@
 //! The closed loop replayed: the recorded command through servo and model, at ideal sensors.
 //!
-//! Starts in the state that the recording shows in its first row; after that nothing measured enters but the command, and the
-//! torque that was added to the servo's, where there was such.
+//! Starts in the state that the recording shows in its first row; after that nothing measured enters but the command, the torque
+//! that was added to the servo's, where there was such, and which of three differences the control takes for the command's speed.
 
-use super::added::{Added, added};
+use super::added::{Added, added, command_speed};
 use super::motion::cubic_at;
 use super::noise::Noise;
 use super::observed::Observed;
 use super::predict::{TorquePrediction, predict_torque};
+use super::servo::CommandSpeed;
 use super::simulate::{Setup, Start, simulate_physics};
 use crate::machine::Axis;
 
@@ -31,6 +32,8 @@ pub struct Prediction {
     pub closed_loop: Option<ClosedLoop>,
     /// What was added to the servo's torque; the closed loop has it too.
     pub added: Option<Added>,
+    /// What the control takes for the speed of its command, by the recorded torque.
+    pub command_speed: CommandSpeed,
 }
 
 /// Predicts a recording: what `gib predict` writes and what the gain of a diagnosis is measured by.
@@ -39,23 +42,59 @@ pub struct Prediction {
 /// As [`predict_torque`] and [`replay`].
 pub fn predict(axis: &Axis, observed: &Observed) -> Result<Prediction, String> {
     let mut torque = predict_torque(axis, observed)?;
-    let mut closed_loop = replay(axis, observed, &torque, &[])?;
-    if let Some(replayed) = &closed_loop {
+    let mut best = Replays::of(axis, observed, &torque, CommandSpeed::Central)?;
+    let speed = command_speed(axis, observed);
+    if speed != CommandSpeed::Central {
+        let other = Replays::of(axis, observed, &torque, speed)?;
+        // A servo that is another one in truth may seem to take another speed, and does not repeat the position by it.
+        if other.error(observed) < best.error(observed) {
+            best = other;
+        }
+    }
+    let Replays { command_speed, alone, given } = best;
+    if let Some(replayed) = &alone {
         fill_rest(&mut torque, observed, replayed);
     }
-    let mut added = added(axis, observed);
-    if let Some(torques) = &added {
-        let with = replay(axis, observed, &torque, &torques.torque)?;
-        // What only the torque sensor saw, the axis did not feel.
-        let felt = error_of(observed, with.as_ref()) < error_of(observed, closed_loop.as_ref());
-        if felt { closed_loop = with } else { added = None }
+    let (closed_loop, added) = given.map_or((alone, None), |(added, replayed)| (Some(replayed), Some(added)));
+    Ok(Prediction { torque, closed_loop, added, command_speed })
+}
+
+/// A recording replayed at one speed of the command.
+struct Replays {
+    command_speed: CommandSpeed,
+    /// By the servo alone.
+    alone: Option<ClosedLoop>,
+    /// With what was added to the servo's torque, where that repeats the position better: what only the torque sensor saw, the
+    /// axis did not feel.
+    given: Option<(Added, ClosedLoop)>,
+}
+
+impl Replays {
+    fn of(
+        axis: &Axis,
+        observed: &Observed,
+        torque: &TorquePrediction,
+        command_speed: CommandSpeed,
+    ) -> Result<Self, String> {
+        let alone = replay(axis, observed, torque, &[], command_speed)?;
+        let mut given = None;
+        if let (Some(alone), Some(added)) = (&alone, added(axis, observed, command_speed)) {
+            let with = replay(axis, observed, torque, &added.torque, command_speed)?;
+            let felt = |with: &ClosedLoop| error_of(observed, with) < error_of(observed, alone);
+            given = with.filter(felt).map(|with| (added, with));
+        }
+        Ok(Self { command_speed, alone, given })
     }
-    Ok(Prediction { torque, closed_loop, added })
+
+    fn error(&self, observed: &Observed) -> f64 {
+        let best = self.given.as_ref().map(|(_, replayed)| replayed).or(self.alone.as_ref());
+        best.map_or(f64::INFINITY, |replayed| error_of(observed, replayed))
+    }
 }
 
 /// Sum of the squared errors of the replayed position.
-fn error_of(observed: &Observed, replayed: Option<&ClosedLoop>) -> f64 {
-    let rows = replayed.into_iter().flat_map(|replayed| replayed.position.iter().zip(&observed.position));
+fn error_of(observed: &Observed, replayed: &ClosedLoop) -> f64 {
+    let rows = replayed.position.iter().zip(&observed.position);
     rows.map(|(replayed, measured)| (replayed - measured).powi(2)).filter(|square| square.is_finite()).sum()
 }
 
@@ -71,6 +110,7 @@ fn replay(
     observed: &Observed,
     prediction: &TorquePrediction,
     added: &[f64],
+    command_speed: CommandSpeed,
 ) -> Result<Option<ClosedLoop>, String> {
     let (Some(servo), Some(command)) = (&axis.servo, &observed.command) else { return Ok(None) };
     let time = &observed.time_s;
@@ -91,7 +131,7 @@ fn replay(
     let position = at_start(&observed.position).unwrap_or(command[0]);
     let torque = finite(prediction.at_start).unwrap_or(0.0);
     let start = Start { position, velocity, torque };
-    let setup = Setup { start: Some(start), ..Setup::default() };
+    let setup = Setup { start: Some(start), command_speed, ..Setup::default() };
     let trace = simulate_physics(axis, prediction.physics.clone(), &command, added, &setup, Noise::new(0))?;
     // The rows of a recording made once a servo cycle are the cycles themselves.
     let rows = |values: Vec<f64>| {

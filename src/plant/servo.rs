@@ -1,10 +1,48 @@
 //! The digital position servo of a machine file, cycle by cycle.
 //!
 //! v = (x[i] − x[i−1])/Ts, or of the mean of two samples; e = Kp·(command − x) + ff·dcommand/dt − v; u = Kv·(e + I), limited;
-//! I += e·Ts/Ti only while not limited. Speeds in the motor's coordinate per second, u in the drive's own unit. The
-//! interpolator knows its own speed, so dcommand/dt is that of the present instant, not of half a cycle ago.
+//! I += e·Ts/Ti only while not limited. Speeds in the motor's coordinate per second, u in the drive's own unit.
 
 use crate::machine::{Servo, VelocityEstimate};
+
+/// What a control takes for dcommand/dt.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum CommandSpeed {
+    /// Over the cycles before and after: an interpolator that knows its own speed tells that of the present instant.
+    #[default]
+    Central,
+    /// Over the cycle before: half a cycle late.
+    Backward,
+    /// Over the cycle after: half a cycle early.
+    Forward,
+}
+
+impl CommandSpeed {
+    /// All of them.
+    pub const ALL: [CommandSpeed; 3] = [CommandSpeed::Central, CommandSpeed::Backward, CommandSpeed::Forward];
+
+    /// The difference's name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            CommandSpeed::Central => "central",
+            CommandSpeed::Backward => "backward",
+            CommandSpeed::Forward => "forward",
+        }
+    }
+
+    /// Travel per cycle of a command at a cycle; at the ends that of the one neighbour there is.
+    #[must_use]
+    pub fn of(self, command: &[f64], cycle: usize) -> f64 {
+        let (before, after) = (cycle.saturating_sub(1), (cycle + 1).min(command.len() - 1));
+        let (from, to) = match self {
+            CommandSpeed::Backward if before < cycle => (before, cycle),
+            CommandSpeed::Forward if cycle < after => (cycle, after),
+            _ => (before, after),
+        };
+        if to == from { 0.0 } else { (command[to] - command[from]) / (to - from) as f64 }
+    }
+}
 
 /// A servo and what it remembers between cycles. Positions in the motor's coordinate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,6 +115,16 @@ mod tests {
             ServoLoop::new(Servo { velocity_estimate: VelocityEstimate::TwoSampleMean, ..SERVO }, 100.0, 0.0, 0.0, 0.0);
         servo.cycle(0.1, 100.0, 0.0);
         assert!((servo.cycle(0.1, 0.0, 0.02) + 0.8).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_speed_of_a_command_is_that_of_its_neighbours() {
+        let command = [0.0, 1.0, 4.0, 9.0];
+        let speeds = |kind: CommandSpeed| [0, 1, 2, 3].map(|cycle| kind.of(&command, cycle));
+        assert_eq!(speeds(CommandSpeed::Central), [1.0, 2.0, 4.0, 5.0]);
+        assert_eq!(speeds(CommandSpeed::Backward), [1.0, 1.0, 3.0, 5.0]);
+        assert_eq!(speeds(CommandSpeed::Forward), [1.0, 3.0, 5.0, 5.0]);
+        assert!(CommandSpeed::ALL.into_iter().all(|kind| kind.of(&[7.0], 0) == 0.0));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::axis::Body;
 use super::coupling::longest_step_s;
 use super::noise::Noise;
 use super::physics::{Physics, Ripple};
-use super::servo::ServoLoop;
+use super::servo::{CommandSpeed, ServoLoop};
 use crate::machine::{Axis, Drive, Servo};
 use std::f64::consts::TAU;
 
@@ -53,11 +53,19 @@ pub struct Setup {
     pub seed: u64,
     /// Start; `None` begins at rest at the first command.
     pub start: Option<Start>,
+    /// What the control takes for the speed of its command.
+    pub command_speed: CommandSpeed,
 }
 
 impl Default for Setup {
     fn default() -> Setup {
-        Setup { step_s: 25e-6, sensors: Sensors::default(), seed: 0, start: None }
+        Setup {
+            step_s: 25e-6,
+            sensors: Sensors::default(),
+            seed: 0,
+            start: None,
+            command_speed: CommandSpeed::default(),
+        }
     }
 }
 
@@ -134,7 +142,7 @@ pub fn simulate_physics(
         let read = encoder.read(motor / scale, &mut noise);
         trace.position.push(read);
         trace.table_position.push(encoder.digitise(table.table_of(table_motor / scale), &mut noise));
-        let speed = speed_of(command, cycle) / servo.period_s;
+        let speed = setup.command_speed.of(command, cycle) / servo.period_s;
         let own = control.cycle(target * scale, speed * scale, read * scale);
         let limit = axis.base.torque_limit;
         let asked = added.get(cycle).map_or(own, |added| (own + added).clamp(-limit, limit));
@@ -150,12 +158,6 @@ pub fn simulate_physics(
         .map(|cycle| on_grid(log.at(&torques, cycle) + noise.normal(setup.sensors.torque_noise), grid))
         .collect();
     Ok(trace)
-}
-
-/// Travel per cycle of a command at a cycle: that of its neighbours, at the ends that of the one neighbour.
-pub(super) fn speed_of(command: &[f64], cycle: usize) -> f64 {
-    let (before, after) = (cycle.saturating_sub(1), (cycle + 1).min(command.len() - 1));
-    if after == before { 0.0 } else { (command[after] - command[before]) / (after - before) as f64 }
 }
 
 /// Whole plant steps in a servo cycle.
