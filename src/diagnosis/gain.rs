@@ -2,7 +2,7 @@
 
 use super::belief;
 use super::fit::{Bench, Fit};
-use super::frame::Columns;
+use super::frame::{Columns, Frame};
 use super::progress::{Stopped, Watch};
 use crate::machine::{Axis, Effect};
 use crate::plant::closed_loop::predict;
@@ -45,14 +45,26 @@ fn torque_errors(observed: &Observed, prediction: &TorquePrediction) -> Vec<f64>
     rows.map(|((measured, predicted), v)| if v.abs() > standing { measured - predicted } else { f64::NAN }).collect()
 }
 
-/// The gains on a recording that was not fitted.
+/// The gains on a recording that was not fitted, and those by which a law may be refuted ([`in_judged_rows`]).
 ///
 /// # Errors
 /// [`Stopped`] when the watch's caller said so.
-pub fn on_holdout(axis: &Axis, extended: &Axis, observed: &Observed, watch: &Watch) -> Result<Vec<Gain>, Stopped> {
-    let both = watch.each(&[axis, extended], (0.92, 0.99), "measuring the gain", |axis| errors(axis, observed))?;
-    let [Some(before), Some(after)] = both.as_slice() else { return Ok(Vec::new()) };
-    Ok(gains(axis, before, after))
+pub fn on_holdout(axis: &Axis, extended: &Axis, holdout: &Columns, watch: &Watch) -> Result<[Vec<Gain>; 2], Stopped> {
+    let Some(observed) = holdout.observed() else { return Ok([Vec::new(), Vec::new()]) };
+    let both = watch.each(&[axis, extended], (0.92, 0.99), "measuring the gain", |axis| errors(axis, &observed))?;
+    let [Some(before), Some(after)] = both.as_slice() else { return Ok([Vec::new(), Vec::new()]) };
+    let (base, columns) = (belief::base_alone(axis), holdout.clone().thinned());
+    let weight = weight_of_rows(&Frame::new(&base, &columns, None), &observed.time_s);
+    let judged = |errors| in_judged_rows(errors, &weight);
+    Ok([gains(axis, before, after), gains(axis, &judged(before), &judged(after))])
+}
+
+/// Errors by which a law may be refuted: of the torque only in judged rows and as they count there. Where the axis sticks or
+/// breaks away few rows hold more error than all others, and no law is answerable for it.
+fn in_judged_rows(errors: &Errors, weight: &[f64]) -> Errors {
+    let [torque, position, table] = errors.clone();
+    let weighed = |torque: Vec<f64>| torque.iter().zip(weight).map(|(error, weight)| error * weight).collect();
+    [torque.map(weighed), position, table]
 }
 
 /// The fitted recording itself as rows that were not fitted: half of its blocks are predicted by a machine that was fitted to
@@ -78,7 +90,7 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
             observed.command = None;
         }
         let half = observed.as_ref().map_or_else(Vec::new, |observed| half_of_rows(bench, &observed.time_s));
-        let weight = observed.as_ref().map_or_else(Vec::new, |observed| weight_of_rows(bench, &observed.time_s));
+        let weight = observed.as_ref().map_or_else(Vec::new, |observed| weight_of_rows(bench.frame, &observed.time_s));
         Self { axis, bench, watch, observed, half, weight }
     }
 
@@ -113,14 +125,10 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
         (count > 0.0).then(|| f64::sqrt(sum / count))
     }
 
-    /// Errors by which a law may be refuted: of the torque only in judged rows and as they count there. Where the axis sticks or
-    /// breaks away few rows hold more error than all others, and no law is answerable for it.
+    /// Errors by which a law may be refuted.
     #[must_use]
     pub fn judged(&self, errors: &Errors) -> Errors {
-        let [torque, position, table] = errors.clone();
-        let weighed =
-            |torque: Vec<f64>| torque.iter().zip(&self.weight).map(|(error, weight)| error * weight).collect();
-        [torque.map(weighed), position, table]
+        in_judged_rows(errors, &self.weight)
     }
 
     /// The gains of one set of causes over another by their errors.
@@ -168,8 +176,7 @@ fn half_of_rows(bench: &Bench, time_s: &[f64]) -> Vec<usize> {
 }
 
 /// For each row the lesser weight of the two judged rows about it; NaN where rows between them are not judged.
-fn weight_of_rows(bench: &Bench, time_s: &[f64]) -> Vec<f64> {
-    let frame = bench.frame;
+fn weight_of_rows(frame: &Frame, time_s: &[f64]) -> Vec<f64> {
     let stride = frame.kept.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap_or(1);
     let mut after = 0;
     let of = |&t: &f64| {

@@ -33,8 +33,8 @@ const MOSTLY: f64 = 2.0 / 3.0;
 /// leave a hundredth of that; several of a wrong form together imitate a curve, and leave more.
 pub const MOST_OF_A_CURVE: f64 = 0.03;
 
-/// Least ratio of what a machine errs by without a spring or clearance over what it errs by with it. In the balance a cause must
-/// take 4 % off the amplitude of what is left; a row as it was measured holds more noise.
+/// Least ratio of what a machine errs by without causes over what it errs by with them for a channel to show them. In the balance
+/// a cause must take 4 % off the amplitude of what is left; a row as it was measured holds more noise.
 const LEAST_RATIO: f64 = 1.02;
 
 /// What stays the same while sets of causes are judged.
@@ -182,6 +182,12 @@ pub fn refuted(gains: &[Gain], causes: &[Effect]) -> bool {
     motor().map(|gain| (gain.before / gain.after).ln()).sum::<f64>() < 0.0 && (surely_worse || !surely_better)
 }
 
+/// Whether a hold-out shows in any channel what the causes change: one whose moves do not call them up says nothing of them.
+#[must_use]
+pub fn shows(gains: &[Gain]) -> bool {
+    gains.iter().any(|gain| (gain.before / gain.after).ln().abs() > LEAST_RATIO.ln())
+}
+
 /// Whether the machine is worse with a cause, or not known to be better in any channel by what can be seen: what such a cause
 /// gains in the balance is none of the machine's.
 fn is_idle(gains: &[Gain]) -> bool {
@@ -263,5 +269,11 @@ mod tests {
         assert!(refuted(std::slice::from_ref(&worse), &saturation(0.3)) && !refuted(&[better], &saturation(0.3)));
         assert!(!refuted(std::slice::from_ref(&worse), &saturation(0.0)));
         assert!(refuted(&[worse, gain("position", 0.9)], &saturation(0.0)));
+    }
+
+    #[test]
+    fn a_hold_out_that_does_not_call_up_a_cause_says_nothing_of_it() {
+        let gain = |ratio: f64| Gain { channel: "torque", before: ratio, after: 1.0, ci95: [ratio, ratio] };
+        assert!(!shows(&[gain(0.9999), gain(1.01)]) && shows(&[gain(1.0), gain(0.9)]) && shows(&[gain(1.1)]));
     }
 }

@@ -8,7 +8,7 @@ use super::experiment;
 use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
 use super::gain::{self, Gain};
-use super::judge::{Excess, Judge, Judged, refutation, refuted, rms};
+use super::judge::{Excess, Judge, Judged, refutation, refuted, rms, shows};
 use super::known;
 use super::progress::{Progress, Stopped, Watch};
 use super::select::{Search, Selection};
@@ -166,17 +166,18 @@ fn answer(recorded: &Recorded, frame: &Frame, mut notes: Vec<String>) -> Result<
     let mut findings = findings(axis, &bench, &judged.selection, &empty);
     let mut extended = extended_by(axis, &findings);
     if let Some(holdout) = holdout {
-        match Columns::of(holdout, axis).map(|columns| (columns.notes(holdout, axis), columns.observed())) {
-            Ok((note, Some(observed))) => {
-                notes.extend(note.iter().map(|note| format!("hold-out: {note}")));
-                judged.gains = gain::on_holdout(axis, &extended, &observed, watch)?;
+        match Columns::of(holdout, axis) {
+            Ok(columns) if columns.observed().is_some() => {
+                notes.extend(columns.notes(holdout, axis).iter().map(|note| format!("hold-out: {note}")));
+                let [gains, in_judged_rows] = gain::on_holdout(axis, &extended, &columns, watch)?;
+                judged.gains = gains;
                 let effects: Vec<Effect> = findings.iter().map(|f| f.effect).collect();
-                if refuted(&judged.gains, &effects) {
+                if shows(&in_judged_rows) && refuted(&in_judged_rows, &effects) {
                     let causes = findings.iter().map(|f| f.effect.cause());
-                    notes.push(refutation(causes, &judged.gains, "the hold-out"));
+                    notes.push(refutation(causes, &in_judged_rows, "the hold-out"));
                     judged = judge.nothing(&judged.selection);
                     (findings, extended) = (Vec::new(), axis.clone());
-                    judged.gains = gain::on_holdout(axis, axis, &observed, watch)?;
+                    [judged.gains, _] = gain::on_holdout(axis, axis, &columns, watch)?;
                 }
             }
             why => {

@@ -24,7 +24,7 @@ pub static LAW: Law = Law {
     starts: |frame, _| {
         // Behind a motor that moves as measured the table swings at its own frequency √(k/J₂), within a band of twice the
         // damping ratio: starts farther apart than that would miss it.
-        let (least, most, share) = (8.0, (0.25 / frame.columns.period_s).min(300.0), 0.33f64);
+        let (least, most, share) = (8.0, (0.25 / frame.columns.period_s).min(300.0), 0.5f64);
         let count = ((most / least).ln() / STEP.ln()).ceil().max(2.0) as usize;
         log_spaced(least, most, count).map(|own| vec![own / (1.0 - share).sqrt(), share, 0.7, 0.04]).collect()
     },
