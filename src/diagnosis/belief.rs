@@ -55,8 +55,9 @@ pub fn together(axis: &Axis, found: Effect) -> Effect {
     }
 }
 
-/// What was found between motor and table together with another inertia, in the words of the axis that has this inertia: it
-/// was simulated with the table's share of the believed one, and what inertia was found beside it is the motor's.
+/// What was found together, in the words of an axis that has all of it. What lies between motor and table was simulated with the
+/// table's share of the believed inertia, and what inertia was found beside it is the motor's; friction that builds up after a
+/// reversal was fitted as that of the Coulomb level alone.
 pub fn reconcile<'e>(axis: &Axis, found: impl Iterator<Item = &'e mut Effect>) {
     let mut found: Vec<&mut Effect> = found.collect();
     let inertia = found.iter().find_map(|e| match **e {
@@ -65,6 +66,29 @@ pub fn reconcile<'e>(axis: &Axis, found: impl Iterator<Item = &'e mut Effect>) {
     });
     if let Some(inertia) = inertia {
         found.iter_mut().for_each(|e| **e = on_inertia(axis, **e, inertia));
+    }
+    let coulomb = found.iter().find_map(|e| match **e {
+        Effect::CoulombFrictionMismatch { torque } => Some(torque),
+        _ => None,
+    });
+    let stribeck = found.iter().find_map(|e| match **e {
+        Effect::StribeckFriction { torque, .. } => Some(torque),
+        _ => None,
+    });
+    if let Some(torque) = stribeck {
+        let coulomb = coulomb.unwrap_or_else(|| axis.belief().coulomb);
+        found.iter_mut().for_each(|e| **e = of_level(**e, coulomb, torque));
+    }
+}
+
+/// Friction builds up to the level at rest, which is higher by what comes with low speed: over as much more of the way, at the
+/// same stiffness.
+fn of_level(effect: Effect, coulomb: f64, more: f64) -> Effect {
+    match effect {
+        Effect::PreslidingFriction { displacement_um } if coulomb > 0.0 && coulomb + more > 0.0 => {
+            Effect::PreslidingFriction { displacement_um: displacement_um * coulomb / (coulomb + more) }
+        }
+        other => other,
     }
 }
 
@@ -153,6 +177,19 @@ mod tests {
         ] {
             assert!((a / b - 1.0).abs() < 1e-9, "{before:?} {after:?}");
         }
+    }
+
+    #[test]
+    fn friction_builds_up_to_the_level_at_rest() {
+        let axis = Axis { effects: Vec::new(), ..axis() };
+        let mut found = [
+            Effect::CoulombFrictionMismatch { torque: 0.9 },
+            Effect::StribeckFriction { torque: 0.3, velocity_mm_s: 5.0 },
+            Effect::PreslidingFriction { displacement_um: 66.0 },
+        ];
+        reconcile(&axis, found.iter_mut());
+        assert_eq!(found[2], Effect::PreslidingFriction { displacement_um: 66.0 * 0.9 / (0.9 + 0.3) });
+        assert_eq!(found[0], Effect::CoulombFrictionMismatch { torque: 0.9 });
     }
 
     #[test]

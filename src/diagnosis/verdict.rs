@@ -210,9 +210,11 @@ fn aligned(recorded: &Recorded, frame: &Frame, late_s: f64, mut notes: Vec<Strin
 fn unexplained(bench: &Bench, fit: &Fit, shown: &[View]) -> Unexplained {
     let [torque, table] = bench.rest(fit);
     let excess = Excess::of(bench, fit, fit);
+    // Of nothing there is no noise.
+    let noise = |rest: &[f64], torque| if rms(rest) > 0.0 { bench.frame.floor(rest, torque) } else { 0.0 };
     let left = |rest: &[f64], channel: usize, views: &[View]| Left {
         rms: rms(rest),
-        noise_rms: bench.frame.floor(rest, channel == 0),
+        noise_rms: noise(rest, channel == 0),
         describes: show::describe(views, excess.of_channel(channel)),
     };
     let of_table = || left(&table, 1, &show::against_all(bench.frame, &table, &table));
