@@ -185,8 +185,9 @@ int homing_names(homing_fault fault, int32_t first, const homing_branch *b)
         [FAULT_LIMIT_NAN] = {GIB_ERR_NON_FINITE},
         [FAULT_LIMIT_LOST] = {GIB_ERR_HOMING_LIMIT, GIB_DONE},
         [FAULT_TORQUE_STUCK] = {GIB_ERR_HOMING_TORQUE_STUCK, GIB_DONE},
-        /* Amid the line it bends the line. */
-        [FAULT_TORQUE_STUCK_HIGH] = {GIB_ERR_HOMING_TORQUE_STUCK, GIB_ERR_HOMING_SHAPE, GIB_ERR_HOMING_TOUCHES, GIB_DONE},
+        /* Amid the line it bends the line; just before a move it is a press without a way, as where an encoder stands. */
+        [FAULT_TORQUE_STUCK_HIGH] = {GIB_ERR_HOMING_TORQUE_STUCK, GIB_ERR_HOMING_SHAPE, GIB_ERR_HOMING_TOUCHES,
+                                     GIB_ERR_HOMING_ENCODER, GIB_DONE},
         /* Amid a way back it looks like a torque that changes sense while the encoder turns. */
         [FAULT_TORQUE_INVERTED] = {GIB_ERR_HOMING_TORQUE_SIGN, GIB_ERR_HOMING_ENCODER, GIB_ERR_HOMING_TIGHT_SPOT, GIB_DONE},
         /* Under pressure a single reading may be too much before it is known for noise. */
