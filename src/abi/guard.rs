@@ -1,6 +1,8 @@
 //! The one door between C and Rust: catches panics, checks pointers and `struct_size`.
 
-use crate::error::{GIB_ERR_HANDLE, GIB_ERR_INTERNAL, GIB_ERR_MEMORY, GIB_ERR_NULL, GIB_ERR_STRUCT_SIZE, GIB_OK};
+use crate::error::{
+    Fault, GIB_ERR_HANDLE, GIB_ERR_INTERNAL, GIB_ERR_MEMORY, GIB_ERR_NULL, GIB_ERR_STATE, GIB_ERR_STRUCT_SIZE, GIB_OK,
+};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Runs setup-side code; a panic becomes `GIB_ERR_INTERNAL`. Never used under a `_step`, which cannot panic.
@@ -46,6 +48,15 @@ pub unsafe fn versioned<T: Copy>(pointer: *const T, first_size: usize) -> Result
         core::ptr::copy_nonoverlapping(bytes, value.as_mut_ptr().cast::<u8>(), known);
         Ok(value.assume_init())
     }
+}
+
+/// Keeps the reason of a refusal for `_last_error`; that a call comes at the wrong time must not hide why the run failed.
+pub fn kept(last: &mut Fault, outcome: Result<(), Fault>) -> i32 {
+    let fault = outcome.err().unwrap_or(Fault::NONE);
+    if fault.code != GIB_ERR_STATE {
+        *last = fault;
+    }
+    fault.code
 }
 
 /// A type that C holds by an opaque handle.

@@ -1,13 +1,13 @@
 //! Family `homing`: homing on a dead stop by torque limit, as seen from C.
 
-use super::guard::{Instance, guarded, instance, instance_mut, placed, versioned};
+use super::guard::{Instance, guarded, instance, instance_mut, kept, placed, versioned};
 use super::types::GibErrorDetail;
 use crate::cycle::homing::config::HomingConfig;
 use crate::cycle::homing::io::{GIB_HOMING_FAILED, HomingInput, HomingOutput};
 use crate::cycle::homing::machine::Homing;
 use crate::cycle::homing::plan::Plan;
 use crate::cycle::homing::verdict::HomingReport;
-use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_ERR_STATE, GIB_OK};
+use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_OK};
 use core::ffi::c_void;
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
@@ -53,19 +53,7 @@ impl GibHoming {
 fn refusable(handle: &mut GibHoming, call: impl FnOnce(&mut Homing) -> Result<(), Fault>) -> i32 {
     let outcome = call(&mut handle.machine);
     handle.mark();
-    match outcome {
-        Ok(()) => {
-            handle.last = Fault::NONE;
-            GIB_OK
-        }
-        Err(fault) => {
-            // While busy the error that counts is the run's.
-            if fault.code != GIB_ERR_STATE {
-                handle.last = fault;
-            }
-            fault.code
-        }
-    }
+    kept(&mut handle.last, outcome)
 }
 
 /// Bytes that an instance needs in memory of your own, to be aligned to 16.

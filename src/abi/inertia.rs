@@ -1,13 +1,13 @@
 //! Family `inertia`: inertia and friction of a spindle from torque and speed, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, placed, versioned};
+use super::guard::{guarded, instance, instance_mut, kept, placed, versioned};
 use super::types::GibErrorDetail;
 use crate::cycle::inertia::config::InertiaConfig;
 use crate::cycle::inertia::io::{GIB_INERTIA_FAILED, InertiaInput, InertiaOutput};
 use crate::cycle::inertia::machine::Inertia;
 use crate::cycle::inertia::plan::Plan;
 use crate::cycle::inertia::report::InertiaReport;
-use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_ERR_STATE, GIB_OK};
+use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_OK};
 use core::ffi::c_void;
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
@@ -31,16 +31,6 @@ impl super::guard::Instance for GibInertia {
     fn bury(&mut self) {
         self.alive = 0;
     }
-}
-
-/// Keeps the reason of a refusal for `_last_error`.
-fn kept(handle: &mut GibInertia, outcome: Result<(), Fault>) -> i32 {
-    let fault = outcome.err().unwrap_or(Fault::NONE);
-    // That a call comes at the wrong time must not hide why the run failed.
-    if fault.code != GIB_ERR_STATE {
-        handle.last = fault;
-    }
-    fault.code
 }
 
 /// Bytes that an instance needs in memory of your own, to be aligned to 16.
@@ -116,7 +106,7 @@ pub unsafe extern "C" fn gib_inertia_start(handle: *mut GibInertia, config: *con
         // SAFETY: the caller's promise; the config is plain numbers.
         let config = unsafe { versioned(config, InertiaConfig::FIRST_SIZE) }?;
         let outcome = handle.machine.start(Plan::new(&config));
-        Ok(kept(handle, outcome))
+        Ok(kept(&mut handle.last, outcome))
     })
 }
 
@@ -248,7 +238,7 @@ pub unsafe extern "C" fn gib_inertia_result(handle: *mut GibInertia, report: *mu
             *report = found;
             verdict
         });
-        Ok(kept(handle, outcome))
+        Ok(kept(&mut handle.last, outcome))
     })
 }
 

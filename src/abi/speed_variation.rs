@@ -1,12 +1,12 @@
 //! Family `speed_variation`: spindle speed variation within the motor's limits, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, placed, versioned};
+use super::guard::{guarded, instance, instance_mut, kept, placed, versioned};
 use super::types::GibErrorDetail;
 use crate::cycle::speed_variation::config::{SpeedVariationConfig, SpeedVariationLimits};
 use crate::cycle::speed_variation::io::{GIB_SPEED_VARIATION_FAILED, SpeedVariationInput, SpeedVariationOutput};
 use crate::cycle::speed_variation::machine::SpeedVariation;
 use crate::cycle::speed_variation::plan::Plan;
-use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_ERR_STATE, GIB_OK};
+use crate::error::{Fault, GIB_ERR_HANDLE, GIB_ERR_NULL, GIB_OK};
 use core::ffi::c_void;
 
 /// Marks memory that holds an instance; its absence tells memory that never did, or does no more.
@@ -30,16 +30,6 @@ impl super::guard::Instance for GibSpeedVariation {
     fn bury(&mut self) {
         self.alive = 0;
     }
-}
-
-/// Keeps the reason of a refusal for `_last_error`.
-fn kept(handle: &mut GibSpeedVariation, outcome: Result<(), Fault>) -> i32 {
-    let fault = outcome.err().unwrap_or(Fault::NONE);
-    // That a call comes at the wrong time must not hide why the run failed.
-    if fault.code != GIB_ERR_STATE {
-        handle.last = fault;
-    }
-    fault.code
 }
 
 /// Bytes that an instance needs in memory of your own, to be aligned to 16.
@@ -122,7 +112,7 @@ pub unsafe extern "C" fn gib_speed_variation_start(
         // SAFETY: the caller's promise; the config is plain numbers.
         let config = unsafe { versioned(config, SpeedVariationConfig::FIRST_SIZE) }?;
         let outcome = handle.machine.start(Plan::to_start(&config));
-        Ok(kept(handle, outcome))
+        Ok(kept(&mut handle.last, outcome))
     })
 }
 
@@ -261,7 +251,7 @@ pub unsafe extern "C" fn gib_speed_variation_result(
         // SAFETY: the caller's promise.
         let (handle, limits) = unsafe { (instance_mut(handle)?, limits.as_mut().ok_or(GIB_ERR_NULL)?) };
         let outcome = handle.machine.limits().map(|found| *limits = found);
-        Ok(kept(handle, outcome))
+        Ok(kept(&mut handle.last, outcome))
     })
 }
 

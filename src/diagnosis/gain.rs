@@ -49,14 +49,29 @@ fn torque_errors(observed: &Observed, prediction: &TorquePrediction) -> Vec<f64>
 ///
 /// # Errors
 /// [`Stopped`] when the watch's caller said so.
-pub fn on_holdout(axis: &Axis, extended: &Axis, holdout: &Columns, watch: &Watch) -> Result<[Vec<Gain>; 2], Stopped> {
-    let Some(observed) = holdout.observed() else { return Ok([Vec::new(), Vec::new()]) };
-    let both = watch.each(&[axis, extended], (0.92, 0.99), "measuring the gain", |axis| errors(axis, &observed))?;
+pub fn on_holdout(axis: &Axis, extended: &Axis, holdout: &Holdout, watch: &Watch) -> Result<[Vec<Gain>; 2], Stopped> {
+    let Holdout { observed, weight } = holdout;
+    let both = watch.each(&[axis, extended], (0.92, 0.99), "measuring the gain", |axis| errors(axis, observed))?;
     let [Some(before), Some(after)] = both.as_slice() else { return Ok([Vec::new(), Vec::new()]) };
-    let (base, columns) = (belief::base_alone(axis), holdout.clone().thinned());
-    let weight = weight_of_rows(&Frame::new(&base, &columns, None), &observed.time_s);
-    let judged = |errors| in_judged_rows(errors, &weight);
+    let judged = |errors| in_judged_rows(errors, weight);
     Ok([gains(axis, before, after), gains(axis, &judged(before), &judged(after))])
+}
+
+/// Another recording, on which nothing is fitted.
+pub struct Holdout {
+    observed: Observed,
+    /// What each row's torque says of a law, see [`weight_of_rows`].
+    weight: Vec<f64>,
+}
+
+impl Holdout {
+    /// Of every row; `None` where no stretch is long enough for a motion.
+    #[must_use]
+    pub fn new(axis: &Axis, columns: Columns) -> Option<Self> {
+        let (observed, base, thinned) = (columns.observed()?, belief::base_alone(axis), columns.thinned());
+        let weight = weight_of_rows(&Frame::new(&base, &thinned, None), &observed.time_s);
+        Some(Self { observed, weight })
+    }
 }
 
 /// Errors by which a law may be refuted: of the torque only in judged rows and as they count there. Where the axis sticks or

@@ -7,7 +7,7 @@ use super::causes::{LAWS, Law, law};
 use super::experiment;
 use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
-use super::gain::{self, Gain};
+use super::gain::{self, Gain, Holdout};
 use super::judge::{Excess, Judge, Judged, refutation, refuted, rms, shows};
 use super::known;
 use super::progress::{Progress, Stopped, Watch};
@@ -166,10 +166,10 @@ fn answer(recorded: &Recorded, frame: &Frame, mut notes: Vec<String>) -> Result<
     let mut findings = findings(axis, &bench, &judged.selection, &empty);
     let mut extended = extended_by(axis, &findings);
     if let Some(holdout) = holdout {
-        match Columns::of(holdout, axis) {
-            Ok(columns) if columns.observed().is_some() => {
-                notes.extend(columns.notes(holdout, axis).iter().map(|note| format!("hold-out: {note}")));
-                let [gains, in_judged_rows] = gain::on_holdout(axis, &extended, &columns, watch)?;
+        match Columns::of(holdout, axis).map(|columns| (columns.notes(holdout, axis), Holdout::new(axis, columns))) {
+            Ok((note, Some(holdout))) => {
+                notes.extend(note.iter().map(|note| format!("hold-out: {note}")));
+                let [gains, in_judged_rows] = gain::on_holdout(axis, &extended, &holdout, watch)?;
                 judged.gains = gains;
                 let effects: Vec<Effect> = findings.iter().map(|f| f.effect).collect();
                 if shows(&in_judged_rows) && refuted(&in_judged_rows, &effects) {
@@ -177,7 +177,7 @@ fn answer(recorded: &Recorded, frame: &Frame, mut notes: Vec<String>) -> Result<
                     notes.push(refutation(causes, &in_judged_rows, "the hold-out"));
                     judged = judge.nothing(&judged.selection);
                     (findings, extended) = (Vec::new(), axis.clone());
-                    [judged.gains, _] = gain::on_holdout(axis, axis, &columns, watch)?;
+                    [judged.gains, _] = gain::on_holdout(axis, axis, &holdout, watch)?;
                 }
             }
             why => {

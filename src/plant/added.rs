@@ -42,8 +42,10 @@ const SURELY: f64 = 4.0;
 /// servo's law surely closest to the torque column, whatever the machine does.
 #[must_use]
 pub fn command_speed(axis: &Axis, observed: &Observed) -> CommandSpeed {
-    let feedforward = axis.servo.as_ref().is_some_and(|servo| servo.velocity_feedforward != 0.0);
-    let law = |speed: &CommandSpeed| Some((*speed, ByLaw::of(axis, observed, *speed).filter(|_| feedforward)?));
+    if !axis.servo.as_ref().is_some_and(|servo| servo.velocity_feedforward != 0.0) {
+        return CommandSpeed::Central;
+    }
+    let law = |speed: &CommandSpeed| Some((*speed, ByLaw::of(axis, observed, *speed)?));
     let laws: Vec<(CommandSpeed, ByLaw)> = CommandSpeed::ALL.iter().filter_map(law).collect();
     // What was added in a few cycles counts no more than noise does at its largest.
     let spread = laws.iter().map(|(_, law)| law.spread).fold(f64::INFINITY, f64::min);
