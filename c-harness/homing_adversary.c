@@ -209,7 +209,8 @@ static void see_command(homing_adversary *a, const gib_homing_input *in)
         /* What breaks a bound is not taken in. */
         int jumps = target == in->position_mm[i] || target == a->told[0][i] || target == a->told[1][i];
         law(a, goes_on || (may_jump && jumps), "a command without a jump");
-        law(a, jumps || g->direction * target <= g->distance_max_mm + 1e-9, "a command within the way");
+        /* With the drive stopped what is commanded does not count. */
+        law(a, jumps || o->stop_drive || g->direction * target <= g->distance_max_mm + 1e-9, "a command within the way");
     }
 }
 
@@ -237,6 +238,19 @@ static void see_answer(homing_adversary *a, const gib_homing_input *in)
     law(a, !dead || o->stop_drive || (in->flags & GIB_INPUT_ABORT), "the drive stopped in its cycle");
 }
 
+/* Whether, on the way out, chips grew against the table or an encoder stood for a while and then jumped: once the drive has its
+ * old limit it answers with that. */
+static int struck(const homing_adversary *a)
+{
+    for (int i = 0; i < a->troubles; i++) {
+        const homing_trouble *t = &a->trouble[i];
+        if ((t->kind == FAULT_CHIPS || t->kind == FAULT_ENCODER_FROZEN) && a->named && t->begun > a->named) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
 /* Torque and way of the real motors and tables. */
 static void see_world(homing_adversary *a, const gib_homing_input *in)
 {
@@ -247,13 +261,13 @@ static void see_world(homing_adversary *a, const gib_homing_input *in)
     a->limited |= p->limit_nm < p->c.torque_limit_nm;
     a->set |= p->out.phase == GIB_HOMING_SET;
     int unlimited = !a->limited || a->set || ever(a, FAULT_LIMIT_IGNORED) || ever(a, FAULT_LIMIT_LOST) ||
-                    ever(a, FAULT_ENCODER_JUMPS);
+                    ever(a, FAULT_ENCODER_JUMPS) || struck(a);
     for (int i = 0; i < p->c.motors; i++) {
         const homing_plant_side *s = &p->side[i];
         double lie = s->x - p->c.sense * in->position_mm[i];
         a->lie_mm[i] = isfinite(lie) ? fmax(a->lie_mm[i], lie) : a->lie_mm[i];
-        /* A stop that breaks away lets go of an axis under torque, which no command holds at once. */
-        double flies = ever(a, FAULT_STOP_GONE) ? 1.0 : 0.0;
+        /* A stop that breaks away or gives way lets go of an axis under torque, which no command holds at once. */
+        double flies = ever(a, FAULT_STOP_GONE) || ever(a, FAULT_STOP_SOFT) ? 1.0 : 0.0;
         law(a, s->y <= g->distance_max_mm + p->c.clearance_mm + a->lie_mm[i] + flies, "the way");
         law(a, unlimited || fabs(s->torque) <= g->torque_limit_nm + 1e-9, "the torque limit");
     }
@@ -320,8 +334,10 @@ static void see_rest(homing_adversary *a)
         for (int i = 0; i < p->c.motors; i++) {
             from[i] = k == swing ? p->side[i].y : from[i];
             /* The kernel's servo may hunt about its goal by stick and slip; a brake holds, but for chips that give way. */
-            int free = kept == GIB_DONE || (lies && !p->out.stop_drive) || ever(a, FAULT_CHIPS);
-            law(a, k <= swing || free || fabs(p->side[i].y - from[i]) <= 0.005, "an axis at rest");
+            const homing_plant_side *s = &p->side[i];
+            int hunts = !p->out.stop_drive && fabs(s->x - s->last_target) <= 0.2;
+            int free = kept == GIB_DONE || (lies && !p->out.stop_drive) || ever(a, FAULT_CHIPS) || hunts;
+            law(a, k <= swing || free || fabs(s->y - from[i]) <= 0.005, "an axis at rest");
         }
     }
 }

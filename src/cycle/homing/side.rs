@@ -93,6 +93,11 @@ pub struct Side {
     pressing: bool,
     pub(super) anchor: f64,
     standing: u32,
+    /// Torque toward the stop with which the axis is free.
+    holds: f64,
+    /// Of the speed with which torque is taken off, and the last of it.
+    relief: f64,
+    relieving: f64,
     /// Torque against way of the present touch.
     pub trace: Trace,
 }
@@ -105,6 +110,7 @@ impl Side {
         self.position = position;
         self.changed_at = position;
         self.filtered = 0.0;
+        self.holds = 0.0;
         self.rough = 0.0;
     }
 
@@ -272,10 +278,17 @@ impl Side {
     }
 
     /// One cycle of taking the torque off a motor that does not move: the command goes against the torque, the faster
-    /// the more there is, so that the servo's integral runs down. True when the torque is off.
+    /// the more there is, so that the servo's integral runs down. True when the torque is off, but for what holds the axis, and
+    /// the command is where the axis is.
     pub fn relieve(&mut self, plan: &Plan) -> bool {
-        let off = self.filtered.abs() <= RELIEVED * plan.limit;
-        let speed = -plan.approach * (RELIEF * self.filtered / plan.limit).clamp(-1.0, 1.0);
+        let (load, now) = (self.filtered - self.holds, plan.torque_sense * self.reading - self.holds);
+        let off = load.abs() <= RELIEVED * plan.limit && now.abs() <= LIGHT * plan.threshold && self.settled(plan);
+        if load.abs() > 0.5 * RELIEVED * plan.limit {
+            // A torque that the command has turned round was answered too fast for this servo.
+            self.relief *= if load * self.relieving < 0.0 { 0.5 } else { 1.0 };
+            self.relieving = load;
+        }
+        let speed = -self.relief * plan.approach * (RELIEF * load / plan.limit).clamp(-1.0, 1.0);
         // A torque that pulls off the stop may lead the command toward it, but not beyond the largest way.
         let left = plan.reach() - plan.sense * (self.profile.position - self.start);
         let toward = lower(speed, higher(left, 0.0));
@@ -288,6 +301,11 @@ impl Side {
     #[must_use]
     pub fn settled(&self, plan: &Plan) -> bool {
         (self.profile.position - self.position).abs() <= 0.1 * plan.press_max
+    }
+
+    /// Begins to take the torque off.
+    pub fn start_relief(&mut self) {
+        (self.relief, self.relieving, self.standing) = (1.0, 0.0, 0);
     }
 
     /// Begins to brake on the way out; returns the cycles that it takes at most.
@@ -318,10 +336,17 @@ impl Side {
         self.pressing || !self.light(plan)
     }
 
-    /// Whether no more torque is on than may be left on.
+    /// Whether no more torque is on than may be left on, beside what holds the axis.
     #[must_use]
     pub fn light(&self, plan: &Plan) -> bool {
-        self.filtered.abs() <= LIGHT * plan.threshold
+        (self.filtered - self.holds).abs() <= LIGHT * plan.threshold
+    }
+
+    /// Takes note of the torque that holds or moves the axis where nothing is touched: an axis with gravity needs it on the way out.
+    pub fn holds(&mut self, plan: &Plan, torque: f64) {
+        if torque.is_finite() {
+            self.holds = torque.clamp(-0.5 * plan.threshold, 0.5 * plan.threshold);
+        }
     }
 
     /// Drops the undone way: the command is where the axis is.

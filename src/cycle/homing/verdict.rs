@@ -151,7 +151,8 @@ impl Touches {
     }
 
     /// Half of what the torque changes by between the two ways, which gravity does not.
-    fn friction(&self) -> f64 {
+    #[must_use]
+    pub fn friction(&self) -> f64 {
         self.slides_back.map_or(self.level().abs(), |back| 0.5 * (self.level() - back).abs())
     }
 

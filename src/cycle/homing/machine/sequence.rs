@@ -1,6 +1,10 @@
 //! The steps between the states: what begins, what a pressed axis leads to, how it ends well and how it ends ill.
 
 use super::*;
+use crate::cycle::profile::{higher, lower};
+
+/// Cycles after which the filtered torque of an axis at rest is its own.
+const HELD: u32 = 24;
 
 impl Homing {
     /// One cycle of the other states under way.
@@ -26,13 +30,17 @@ impl Homing {
                 }
             }
             Phase::Evaluate => {
-                if self.fitted() {
+                if let Some(fault) = self.wound_up() {
+                    self.leave(fault);
+                } else if self.fitted() {
                     self.evaluated();
                 }
             }
             Phase::Offset => {
                 // Homed is homed where the axis is, not where its command is.
-                if self.follow() && self.sides.iter().take(self.plan.motors).all(|side| side.came(&self.plan)) {
+                if let Some(fault) = self.never_comes() {
+                    self.leave(fault);
+                } else if self.follow() && self.sides.iter().take(self.plan.motors).all(|side| side.came(&self.plan)) {
                     self.set();
                 }
             }
@@ -55,7 +63,9 @@ impl Homing {
         for (i, side) in self.sides.iter_mut().enumerate().take(self.plan.motors) {
             let (position, torque) = (input.position_mm[i], input.torque[i]);
             if side.trusted(&self.plan, position, torque) {
-                side.sense(&self.plan, position, torque);
+                // The bound is broken already, or need not be: a reading that no drive can give must not look like a load.
+                let (low, high) = (self.plan.bound_below, self.plan.bound);
+                side.sense(&self.plan, position, lower(higher(torque, low), high));
             } else {
                 trusted = false;
             }
@@ -80,7 +90,10 @@ impl Homing {
     fn overdue_exit(&mut self) {
         match self.phase {
             Phase::Restore => self.give_up(),
-            Phase::Unload if self.hears() => self.enter(Phase::Relieve, f64::from(self.plan.ack_timeout)),
+            Phase::Unload if self.hears() => {
+                self.sides.iter_mut().for_each(Side::start_relief);
+                self.enter(Phase::Relieve, f64::from(self.plan.ack_timeout));
+            }
             // Nobody can tell when the torque is off.
             _ => self.stop_drive(),
         }
@@ -101,7 +114,7 @@ impl Homing {
     fn restoring(&mut self, input: &HomingInput) {
         let plan = &self.plan;
         let loaded = self.sides.iter().take(plan.motors).any(|side| side.filtered.abs() > plan.release);
-        if loaded && self.hears() && self.output.stop_drive == 0 {
+        if loaded && self.output.stop_drive == 0 {
             self.stop_drive();
         } else if self.confirmed(input) {
             self.changed = false;
@@ -118,12 +131,14 @@ impl Homing {
     fn unloading(&mut self) {
         let (plan, tight) = (self.plan, self.fault.code == GIB_ERR_HOMING_TIGHT_SPOT);
         let mut sides = self.sides.iter().take(plan.motors);
-        // On a tight spot the encoder rightly stands.
-        if !tight && sides.any(|side| side.frozen_in_move(&plan)) {
+        // On a tight spot the encoder rightly stands, until the axis has left it.
+        if sides.any(|side| if tight { side.frozen_off_spot(&plan) } else { side.frozen_on_way_out(&plan) }) {
             return self.stop_drive();
         }
         let back = self.arrived();
-        let free = |side: &Side| side.settled(&plan) && (side.light(&plan) || !self.hears());
+        // A reading that stands at the limit may tell of a motor that does.
+        let quiet = |side: &Side| side.light(&plan) || (!self.hears() && side.filtered.abs() <= plan.release);
+        let free = |side: &Side| side.settled(&plan) && quiet(side);
         if back && self.sides.iter().take(plan.motors).all(free) {
             self.restore();
         }
@@ -164,6 +179,24 @@ impl Homing {
             }
         }
         all
+    }
+
+    /// The command has ended, the axis has not come, and the servo winds up on an encoder that stands.
+    #[inline(always)]
+    fn never_comes(&self) -> Option<Fault> {
+        let stands = |side: &&Side| side.profile.speed == 0.0 && side.frozen_on_way_out(&self.plan);
+        self.sides.iter().take(self.plan.motors).find(stands).map(|side| side.broken_sensor(&self.plan))
+    }
+
+    /// What an axis that stands back from a touch says of its encoder, if anything: a servo whose encoder fails at a stand winds up
+    /// and runs away.
+    #[inline(always)]
+    fn wound_up(&self) -> Option<Fault> {
+        if self.touch >= self.plan.touches {
+            return None; // pressed
+        }
+        let mut sides = self.sides.iter().zip(&self.touches).take(self.plan.motors);
+        sides.find_map(|(side, touches)| side.wound_up(&self.plan, touches))
     }
 
     /// One slice of the evaluation of the last touch; true when it is done for all motors.
@@ -212,14 +245,20 @@ impl Homing {
     fn evaluated(&mut self) {
         let plan = self.plan;
         let back = self.touch < plan.touches;
-        for (side, touches) in self.sides.iter().zip(&mut self.touches).take(if back { plan.motors } else { 0 }) {
+        for (side, touches) in self.sides.iter_mut().zip(&mut self.touches).take(if back { plan.motors } else { 0 }) {
             touches.slid_back(side.sliding);
+            side.holds(&plan, side.sliding);
             if let Some(fault) = side.held_back(&plan, touches.level()) {
                 return self.leave(self.or_racked(fault));
             }
         }
         if self.suspect != Fault::NONE {
             return self.leave(self.or_racked(self.suspect));
+        }
+        let pressed = self.sides.iter().zip(&self.touches).take(if back { 0 } else { plan.motors });
+        if let Some(fault) = { pressed }.find_map(|(side, touches)| side.pressed_elsewhere(&plan, touches.press(&plan)))
+        {
+            return self.leave(fault);
         }
         if back {
             if self.touch == 0 {
@@ -255,6 +294,9 @@ impl Homing {
             let beyond = side.travel(plan) + plan.retract + plan.press_max + plan.lag_limit;
             let reach = if self.touch == 0 { plan.reach() } else { beyond.min(plan.reach()) };
             side.start_touch(plan, speed, reach);
+            if self.touch == 0 && self.now >= HELD {
+                side.holds(plan, side.filtered);
+            }
         }
         self.enter(Phase::Touch, f64::from(u32::MAX));
     }
@@ -396,12 +438,15 @@ impl Homing {
         if self.sides.iter().take(plan.motors).any(Side::dead) {
             return self.stop_drive();
         }
+        // A gantry goes back with both motors, whichever is loaded: one alone would rack the beam.
+        let behind = |side: &Side| plan.sense * (side.profile.position - side.position) > 0.1 * plan.press_max;
+        let loaded = self.sides.iter().take(plan.motors).any(|side| side.pressing(&plan) || behind(side));
+        let way = if loaded { plan.sense * plan.press_max } else { 0.0 };
         for side in self.sides.iter_mut().take(plan.motors) {
-            let behind = plan.sense * (side.profile.position - side.position) > 0.1 * plan.press_max;
-            let loaded = side.pressing(&plan) || behind;
             // A command that stays ahead would wind the servo up against what it touches while the restore is waited for.
-            let goal = side.position - if loaded { plan.sense * plan.press_max } else { 0.0 };
-            bound = bound.max(side.go(&plan, goal, plan.approach));
+            // An axis that was flung beyond the largest way is brought back into it.
+            let beyond = plan.sense * higher(side.travel(&plan) - plan.sense * way - plan.distance[1], 0.0);
+            bound = bound.max(side.go(&plan, side.position - way - beyond, plan.approach));
         }
         self.enter(Phase::Unload, bound + plan.settling());
     }

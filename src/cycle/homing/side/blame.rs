@@ -4,6 +4,7 @@
 //! nobody follows look alike in one cycle; they differ in what the torque did meanwhile.
 
 use super::*;
+use crate::cycle::homing::verdict::Touches;
 
 /// Change of torque, as a share of the limit, that no standing encoder explains: a stop gives way by some counts of
 /// the encoder. After a turn, friction on the motor's side may hold the motor while its torque changes sense.
@@ -124,11 +125,57 @@ impl Side {
         let touches = self.from == self.origin;
         let never_moved = touches && self.position == self.origin && self.filtered >= plan.threshold;
         let share = if under_way { RIGID } else { RIGID_AFTER_TURN };
-        let most = share * plan.limit;
-        let changed = (self.reading - self.free[0]).abs() > most && (self.filtered - self.free[1]).abs() > 0.5 * most;
+        let changed = self.changed_by(share * plan.limit);
         let patience = if under_way { self.frozen_limit } else { 3 * self.frozen_limit };
         let long = self.frozen > patience && self.filtered.abs() < plan.release;
         never_moved || changed || long
+    }
+
+    /// Whether the torque has changed by more than that since the encoder stands.
+    fn changed_by(&self, most: f64) -> bool {
+        (self.reading - self.free[0]).abs() > most && (self.filtered - self.free[1]).abs() > 0.5 * most
+    }
+
+    /// What is wrong where the axis stands back from a touch, if anything: a torque that has changed, and goes beyond what moved
+    /// the axis before, does not leave its encoder as it is.
+    #[inline(always)]
+    #[must_use]
+    pub fn wound_up(&self, plan: &Plan, touches: &Touches) -> Option<Fault> {
+        if self.frozen < ALIVE || !self.changed_by(RIGID * plan.limit) {
+            None
+        } else {
+            self.name_wound_up(plan, touches)
+        }
+    }
+
+    #[cold]
+    fn name_wound_up(&self, plan: &Plan, touches: &Touches) -> Option<Fault> {
+        // Friction at rest may be half as much again as sliding, and as noise.
+        let friction = if touches.count() > 0 { touches.friction() } else { self.sliding.abs() };
+        let margin = 0.5 * friction + 0.1 * plan.limit + 4.0 * FILTERED * self.noise();
+        let low = if self.sliding.is_finite() { self.sliding - margin } else { -plan.release };
+        let high = if touches.count() > 0 { touches.level() + margin } else { plan.release };
+        let torque = lower(self.filtered.abs(), self.reading.abs()).copysign(self.filtered);
+        if (low..=high).contains(&torque) {
+            return None;
+        }
+        let (low, high) = (low * plan.torque_sense, high * plan.torque_sense);
+        let odd = Fault { value: self.reading, field: "torque\0", ..Fault::NONE };
+        Some(if 3.0 * self.noise() > RIGID * plan.limit {
+            Fault { code: GIB_ERR_HOMING_NOISE, ..odd }
+        } else {
+            Fault { code: GIB_ERR_HOMING_ENCODER, low: low.min(high), high: low.max(high), ..odd }
+        })
+    }
+
+    /// What is wrong where a motor stands pressed after its deviation was cleared, if anything: the torque is at the limit again,
+    /// but at a place where nothing was touched before. `press`: way from contact to the limit.
+    #[must_use]
+    pub fn pressed_elsewhere(&self, plan: &Plan, press: f64) -> Option<Fault> {
+        let back = plan.sense * (self.anchor - self.position);
+        let elsewhere = self.filtered >= plan.threshold && back > press + plan.standing_way;
+        let fault = Fault { field: "position_mm\0", value: back, ..Fault::of(GIB_ERR_HOMING_ENCODER) };
+        elsewhere.then_some(Fault { low: 0.0, high: press, ..fault })
     }
 
     /// What the way back tells, if anything is wrong with what was pressed on. `level`: torque before contact. Nothing
@@ -160,6 +207,20 @@ impl Side {
     #[must_use]
     pub fn frozen_in_move(&self, plan: &Plan) -> bool {
         self.frozen > 0 && self.profile.speed != 0.0 && self.rigid(plan)
+    }
+
+    /// The same on the way out, and where the command has ended but the axis has not come: the servo winds up.
+    #[must_use]
+    pub fn frozen_on_way_out(&self, plan: &Plan) -> bool {
+        self.frozen_in_move(plan)
+            || (!self.settled(plan) && self.frozen >= ALIVE && self.changed_by(RIGID_AFTER_TURN * plan.limit))
+    }
+
+    /// The same of an axis that was held, and moved since.
+    #[must_use]
+    pub fn frozen_off_spot(&self, plan: &Plan) -> bool {
+        let under_way = (self.position - self.from).abs() > UNDER_WAY * plan.retract;
+        under_way && !self.settled(plan) && self.frozen >= ALIVE && self.changed_by(RIGID * plan.limit)
     }
 
     /// Whether a torque that stands at the limit is none: it did before the touch began.
