@@ -150,6 +150,18 @@ static int ever(const homing_adversary *a, int kind)
     return 0;
 }
 
+/* Whether such a trouble was there in that cycle. */
+static int lasts_till(const homing_adversary *a, int kind, int cycle)
+{
+    for (int i = 0; i < a->troubles; i++) {
+        const homing_trouble *t = &a->trouble[i];
+        if (t->kind == kind && t->begun && t->begun <= cycle && cycle - t->begun <= t->lasts) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
 static void tamper(homing_adversary *a, gib_homing_input *in)
 {
     static const double ODD[] = {NAN, INFINITY, -INFINITY}, HUGE_NM[] = {1e3, -1e3, 1e30, DBL_MAX, -DBL_MAX};
@@ -269,7 +281,10 @@ static void see_world(homing_adversary *a, const gib_homing_input *in)
         /* A stop that breaks away or gives way lets go of an axis under torque, which no command holds at once. */
         double flies = ever(a, FAULT_STOP_GONE) || ever(a, FAULT_STOP_SOFT) ? 1.0 : 0.0;
         law(a, s->y <= g->distance_max_mm + p->c.clearance_mm + a->lie_mm[i] + flies, "the way");
-        law(a, unlimited || fabs(s->torque) <= g->torque_limit_nm + 1e-9, "the torque limit");
+        /* A drive that limits late takes the time of its current loop to come down. */
+        int falls = a->limited && fabs(s->torque) < a->torque_nm[i];
+        a->torque_nm[i] = fabs(s->torque);
+        law(a, unlimited || falls || fabs(s->torque) <= g->torque_limit_nm + 1e-9, "the torque limit");
     }
 }
 
@@ -314,6 +329,7 @@ static void cycle(homing_adversary *a)
     memcpy(a->told[1], a->told[0], sizeof a->told[1]);
     memcpy(a->told[0], in.position_mm, sizeof a->told[0]);
     a->named = a->named || p->out.message == 0 ? a->named : a->cycles;
+    a->slipped_mm = p->out.phase == GIB_HOMING_TOUCH ? p->side[0].slipped : a->slipped_mm;
 }
 
 /* Half a second to swing out, a tenth of rest. */
@@ -379,14 +395,16 @@ static void see_restored(homing_adversary *a)
 }
 
 /* Homed in spite of troubles: home is right, as far as gib can know: of a stop that is another, a jump that a motor may make in a
- * cycle, and a position that a kernel does not set and need not confirm, it cannot. */
+ * cycle, or that comes out only after the end since the encoder stood, what an encoder slips once the last touch is over, and a
+ * position that a kernel does not set and need not confirm, it cannot. */
 static void see_home(homing_adversary *a)
 {
     const homing_plant *p = &a->world.plant;
     const homing_plant_config *c = &p->c;
     const gib_homing_config *g = &a->world.config;
     double approach = given(g->approach_speed_mm_s, 1.0), offset = given(g->zero_offset_speed_mm_s, approach);
-    int jumped = ever(a, FAULT_ENCODER_JUMPS) && 0.01 + 10.0 * fmax(approach, offset) * c->cycle_s > 0.3;
+    int hidden = lasts_till(a, FAULT_ENCODER_FROZEN, a->ended) || 0.01 + 10.0 * fmax(approach, offset) * c->cycle_s > 0.3;
+    int jumped = ever(a, FAULT_ENCODER_JUMPS) && hidden;
     int unset = (g->unacknowledged & GIB_HOMING_REQUEST_SET_POSITION) && ever(a, FAULT_NO_ACKNOWLEDGEMENT);
     if (jumped || unset || ever(a, FAULT_STOP_EARLY) || ever(a, FAULT_CHIPS) || c->stop_mm[0] != c->stop_mm[1] ||
         g->method == GIB_HOMING_THRESHOLD) {
@@ -394,7 +412,8 @@ static void see_home(homing_adversary *a)
     }
     gib_homing_report report;
     gib_homing_result(homing_world_gib(&a->world), &report);
-    double contact = a->stop_mm + homing_plant_lead(c, fmin(approach, 1.0)) - p->side[0].slipped;
+    double slipped = ever(a, FAULT_ENCODER_JUMPS) ? p->side[0].slipped : a->slipped_mm;
+    double contact = a->stop_mm + homing_plant_lead(c, fmin(approach, 1.0)) - slipped;
     double error = 1e3 * (contact + c->sense * p->shift_mm[0] - c->sense * g->set_position_mm - g->zero_offset_mm);
     double allowed = fmax(20.0, 4.0 * report.side[0].uncertainty_um);
     a->home_error_um = fabs(error);

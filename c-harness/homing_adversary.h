@@ -47,6 +47,8 @@ typedef struct {
     double told[2][2]; /* positions of the last two cycles */
     int limited, set; /* the torque limit was in force; was given back */
     double lie_mm[2]; /* most that the encoder has hidden toward the stop */
+    double torque_nm[2]; /* of the real motors in the cycle before */
+    double slipped_mm;   /* by the end of the last touch */
     double late[8][2];
     int named, ended, cycles;
     uint32_t events;

@@ -97,6 +97,7 @@ void homing_plant_break(homing_plant *p, homing_fault fault, int side)
             s->stuck_at = 4.9;
         } else if (fault == FAULT_STOP_EARLY && s->y < p->c.stop_mm[i]) {
             p->c.stop_mm[i] = fmin(p->c.stop_mm[i], s->y + 0.1);
+            s->crushed = fmax(s->crushed, s->y - (p->c.stop_mm[i] - p->c.chips_mm)); /* it brings no chips along */
         }
     }
     p->faults |= side < 0 ? bit(fault) : 0u;

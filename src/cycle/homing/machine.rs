@@ -22,6 +22,7 @@ mod quick;
 #[cfg(test)]
 mod quick_tests;
 mod sequence;
+mod way_out;
 
 /// Where the machine is. Each comment says what ends the state.
 #[derive(Debug, Clone, Copy, PartialEq)]

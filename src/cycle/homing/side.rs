@@ -250,6 +250,12 @@ impl Side {
         if self.standing >= plan.detection { Touch::Pressed } else { Touch::Held }
     }
 
+    /// Where the last touch has ended.
+    #[must_use]
+    pub fn end(&self) -> f64 {
+        self.anchor
+    }
+
     /// Begins a move to `goal` and returns the cycles that it takes at most. The trace stays that of the touch before.
     pub fn go(&mut self, plan: &Plan, goal: f64, speed: f64) -> f64 {
         self.trace.pause();
@@ -320,6 +326,13 @@ impl Side {
     #[must_use]
     pub fn trusted(&self, plan: &Plan, position: f64, torque: f64) -> bool {
         position.is_finite() && torque.is_finite() && (position - self.position).abs() <= plan.jump
+    }
+
+    /// Whether the axis flies on beyond the largest way, faster than it is moved, as when a stop breaks away under torque.
+    #[must_use]
+    pub fn flung(&self, plan: &Plan, position: f64) -> bool {
+        let (beyond, speed) = (plan.sense * (position - self.start) - plan.distance[1], position - self.position);
+        beyond > 0.25 * plan.press_max && plan.sense * speed > plan.approach.max(plan.offset_speed)
     }
 
     /// The axis has gone with its command: nearly all the way, or most of it when nothing holds it, which a servo without

@@ -70,6 +70,8 @@ pub struct Touches {
     coarse: bool,
     first_level: f64,
     first_press: f64,
+    /// Where it ended, mm.
+    pub first_end: f64,
     /// Torque toward the stop while the axis slid back from it, once it did.
     slides_back: Option<f64>,
     threshold: f64,

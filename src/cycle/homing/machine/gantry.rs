@@ -50,10 +50,11 @@ impl Homing {
 
     /// What a touch found wrong, which is the racked beam where one side is held by it.
     pub(super) fn or_racked(&self, fault: Fault) -> Fault {
-        let held = matches!(
-            fault.code,
-            GIB_ERR_HOMING_SHAPE | GIB_ERR_HOMING_NOISE | GIB_ERR_HOMING_TIGHT_SPOT | GIB_ERR_HOMING_SOFT_STOP
-        );
+        let held = match fault.code {
+            GIB_ERR_HOMING_SHAPE | GIB_ERR_HOMING_NOISE | GIB_ERR_HOMING_TIGHT_SPOT | GIB_ERR_HOMING_SOFT_STOP => true,
+            GIB_ERR_HOMING_TORQUE_STUCK => self.alive(), // the beam pulls the side toward the stop
+            _ => false,
+        };
         let racked = self.pressed_apart.abs() > RACKED * self.plan.square;
         if held && racked { self.out_of_square(self.pressed_apart) } else { fault }
     }

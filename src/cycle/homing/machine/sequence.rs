@@ -1,7 +1,7 @@
 //! The steps between the states: what begins, what a pressed axis leads to, how it ends well and how it ends ill.
 
 use super::*;
-use crate::cycle::profile::{higher, lower};
+use crate::cycle::profile::higher;
 
 /// Cycles after which the filtered torque of an axis at rest is its own.
 const HELD: u32 = 24;
@@ -24,13 +24,15 @@ impl Homing {
                 }
             }
             Phase::Clear => {
-                if self.confirmed(input) {
+                if let Some(fault) = self.astray() {
+                    self.leave(fault);
+                } else if self.confirmed(input) {
                     self.event(GIB_HOMING_EVENT_CLEAR_ACKNOWLEDGED);
                     self.cleared();
                 }
             }
             Phase::Evaluate => {
-                if let Some(fault) = self.wound_up() {
+                if let Some(fault) = self.astray() {
                     self.leave(fault);
                 } else if self.fitted() {
                     self.evaluated();
@@ -45,7 +47,9 @@ impl Homing {
                 }
             }
             Phase::Set => {
-                if self.confirmed(input) {
+                if let Some(fault) = self.astray() {
+                    self.leave(fault);
+                } else if self.confirmed(input) {
                     self.changed = false;
                     self.event(GIB_HOMING_EVENT_HOMED);
                     self.enter(Phase::Done, 0.0);
@@ -53,115 +57,6 @@ impl Homing {
             }
             _ => {}
         }
-    }
-
-    /// A cycle on the way out: it ends whatever the input says, without a move where position or drive are not to be
-    /// trusted.
-    pub(super) fn exit(&mut self, input: &HomingInput) {
-        self.now += 1;
-        let mut trusted = input.flags & !GIB_INPUT_ABORT == 0;
-        for (i, side) in self.sides.iter_mut().enumerate().take(self.plan.motors) {
-            let (position, torque) = (input.position_mm[i], input.torque[i]);
-            if side.trusted(&self.plan, position, torque) {
-                // The bound is broken already, or need not be: a reading that no drive can give must not look like a load.
-                let (low, high) = (self.plan.bound_below, self.plan.bound);
-                side.sense(&self.plan, position, lower(higher(torque, low), high));
-            } else {
-                trusted = false;
-            }
-        }
-        if !trusted && self.output.stop_drive == 0 {
-            self.stop_drive();
-        } else if self.now >= self.deadline {
-            self.overdue_exit();
-        } else {
-            match self.phase {
-                Phase::Restore => self.restoring(input),
-                Phase::Stopping if self.stopped => self.unload(),
-                Phase::Stopping => self.stopped = self.arrived(),
-                Phase::Unload => self.unloading(),
-                _ => self.relieving(),
-            }
-        }
-        self.command();
-    }
-
-    #[cold]
-    fn overdue_exit(&mut self) {
-        match self.phase {
-            Phase::Restore => self.give_up(),
-            Phase::Unload if self.hears() => {
-                self.sides.iter_mut().for_each(Side::start_relief);
-                self.enter(Phase::Relieve, f64::from(self.plan.ack_timeout));
-            }
-            // Nobody can tell when the torque is off.
-            _ => self.stop_drive(),
-        }
-    }
-
-    /// No command can be trusted to make the axis safe: the torque is to be taken off it.
-    #[cold]
-    fn stop_drive(&mut self) {
-        self.output.stop_drive = 1;
-        self.sides.iter_mut().for_each(|side| side.clear_lag(&self.plan));
-        if self.phase != Phase::Restore {
-            self.restore();
-        }
-    }
-
-    /// Waits, with no torque on the axis: one that comes back, as of a servo on an encoder that stands, is taken off before the drive
-    /// may give more.
-    fn restoring(&mut self, input: &HomingInput) {
-        let plan = &self.plan;
-        let loaded = self.sides.iter().take(plan.motors).any(|side| side.filtered.abs() > plan.release);
-        if loaded && self.output.stop_drive == 0 {
-            self.stop_drive();
-        } else if self.confirmed(input) {
-            self.changed = false;
-            self.fail();
-        }
-    }
-
-    /// Whether the torque tells anything.
-    fn hears(&self) -> bool {
-        !matches!(self.fault.code, GIB_ERR_HOMING_TORQUE_STUCK | GIB_ERR_HOMING_TORQUE_SIGN)
-    }
-
-    /// One cycle off the stop. Ends where the command ends, the axis has followed, and nothing holds it.
-    fn unloading(&mut self) {
-        let (plan, tight) = (self.plan, self.fault.code == GIB_ERR_HOMING_TIGHT_SPOT);
-        let mut sides = self.sides.iter().take(plan.motors);
-        // On a tight spot the encoder rightly stands, until the axis has left it.
-        if sides.any(|side| if tight { side.frozen_off_spot(&plan) } else { side.frozen_on_way_out(&plan) }) {
-            return self.stop_drive();
-        }
-        let back = self.arrived();
-        // A reading that stands at the limit may tell of a motor that does.
-        let quiet = |side: &Side| side.light(&plan) || (!self.hears() && side.filtered.abs() <= plan.release);
-        let free = |side: &Side| side.settled(&plan) && quiet(side);
-        if back && self.sides.iter().take(plan.motors).all(free) {
-            self.restore();
-        }
-    }
-
-    /// The axis did not follow, something holds it: the servo must not go on pulling once it has its full torque.
-    fn relieving(&mut self) {
-        let mut all = true;
-        for side in self.sides.iter_mut().take(self.plan.motors) {
-            all &= side.relieve(&self.plan);
-        }
-        if all {
-            self.restore();
-        }
-    }
-
-    /// Advances the commands; true when all have arrived.
-    fn arrived(&mut self) -> bool {
-        let mut all = true;
-        for side in self.sides.iter_mut().take(self.plan.motors) {
-            all &= side.profile.step();
-        }
-        all
     }
 
     /// Advances the commands with an eye on encoder and torque; true when all have arrived.
@@ -188,15 +83,16 @@ impl Homing {
         self.sides.iter().take(self.plan.motors).find(stands).map(|side| side.broken_sensor(&self.plan))
     }
 
-    /// What an axis that stands back from a touch says of its encoder, if anything: a servo whose encoder fails at a stand winds up
-    /// and runs away.
-    #[inline(always)]
-    fn wound_up(&self) -> Option<Fault> {
-        if self.touch >= self.plan.touches {
-            return None; // pressed
-        }
+    /// What an axis that is to stand does instead, if anything. Off the stop, a servo whose encoder fails winds up and runs away;
+    /// pressed, what it presses on may give way.
+    #[inline(never)]
+    fn astray(&self) -> Option<Fault> {
         let mut sides = self.sides.iter().zip(&self.touches).take(self.plan.motors);
-        sides.find_map(|(side, touches)| side.wound_up(&self.plan, touches))
+        if self.touch >= self.plan.touches && self.phase != Phase::Set {
+            sides.find_map(|(side, touches)| side.gives_way(&self.plan, touches.press(&self.plan)))
+        } else {
+            sides.find_map(|(side, touches)| side.wound_up(&self.plan, touches))
+        }
     }
 
     /// One slice of the evaluation of the last touch; true when it is done for all motors.
@@ -255,9 +151,12 @@ impl Homing {
         if self.suspect != Fault::NONE {
             return self.leave(self.or_racked(self.suspect));
         }
-        let pressed = self.sides.iter().zip(&self.touches).take(if back { 0 } else { plan.motors });
-        if let Some(fault) = { pressed }.find_map(|(side, touches)| side.pressed_elsewhere(&plan, touches.press(&plan)))
-        {
+        let mut sides = self.sides.iter().zip(&self.touches).take(plan.motors);
+        let elsewhere = |side: &Side, touches: &Touches| {
+            let pressed = if back { None } else { side.pressed_elsewhere(&plan, touches) };
+            pressed.or_else(|| side.ended_elsewhere(&plan, touches))
+        };
+        if let Some(fault) = sides.find_map(|(side, touches)| elsewhere(side, touches)) {
             return self.leave(fault);
         }
         if back {
@@ -339,6 +238,7 @@ impl Homing {
                 return self.leave(early(GIB_ERR_HOMING_EARLY, plan.distance[0]));
             }
             self.event(GIB_HOMING_EVENT_LIMITING);
+            self.touches.iter_mut().zip(&self.sides).for_each(|(touches, side)| touches.first_end = side.end());
         } else if let Some(fault) = self.sides.iter().take(plan.motors).find_map(|side| side.pressed_at_once(&plan)) {
             return self.leave(fault);
         }
@@ -431,7 +331,7 @@ impl Homing {
 
     /// Standing: goes back from whatever was pressed on, by the way that pressing may have wound up.
     #[cold]
-    fn unload(&mut self) {
+    pub(super) fn unload(&mut self) {
         self.plan.moves_at(self.plan.approach.max(self.plan.offset_speed));
         let plan = self.plan;
         let mut bound = 0f64;
@@ -447,12 +347,13 @@ impl Homing {
             // An axis that was flung beyond the largest way is brought back into it.
             let beyond = plan.sense * higher(side.travel(&plan) - plan.sense * way - plan.distance[1], 0.0);
             bound = bound.max(side.go(&plan, side.position - way - beyond, plan.approach));
+            side.frozen_limit = plan.frozen(plan.approach);
         }
         self.enter(Phase::Unload, bound + plan.settling());
     }
 
     /// Last part of the door: gives the old torque limit back if it was changed.
-    fn restore(&mut self) {
+    pub(super) fn restore(&mut self) {
         if self.changed {
             self.request(GIB_HOMING_REQUEST_TORQUE_LIMIT, self.old_limit);
             self.enter(Phase::Restore, f64::from(self.plan.ack_timeout));
@@ -462,12 +363,12 @@ impl Homing {
     }
 
     /// The restore was not confirmed in time. The request stays on the output.
-    fn give_up(&mut self) {
+    pub(super) fn give_up(&mut self) {
         self.fail();
         self.output.message = GIB_ERR_RESTORE_UNCONFIRMED;
     }
 
-    fn fail(&mut self) {
+    pub(super) fn fail(&mut self) {
         self.enter(Phase::Failed, 0.0);
         self.output.status = self.fault.code;
     }

@@ -168,12 +168,14 @@ impl Side {
         })
     }
 
-    /// What is wrong where a motor stands pressed after its deviation was cleared, if anything: the torque is at the limit again,
-    /// but at a place where nothing was touched before. `press`: way from contact to the limit.
+    /// What is wrong where a motor stands pressed after its deviation was cleared, if anything: something is pressed on, but at a place
+    /// where nothing was touched before.
     #[must_use]
-    pub fn pressed_elsewhere(&self, plan: &Plan, press: f64) -> Option<Fault> {
-        let back = plan.sense * (self.anchor - self.position);
-        let elsewhere = self.filtered >= plan.threshold && back > press + plan.standing_way;
+    pub fn pressed_elsewhere(&self, plan: &Plan, touches: &Touches) -> Option<Fault> {
+        let (back, press) = (plan.sense * (self.anchor - self.position), touches.press(plan));
+        // Friction at rest may be half as much again as sliding.
+        let free = touches.level() + 0.5 * touches.friction() + LIGHT * plan.threshold;
+        let elsewhere = self.filtered >= lower(free, plan.threshold) && back > press + plan.standing_way;
         let fault = Fault { field: "position_mm\0", value: back, ..Fault::of(GIB_ERR_HOMING_ENCODER) };
         elsewhere.then_some(Fault { low: 0.0, high: press, ..fault })
     }
@@ -223,6 +225,18 @@ impl Side {
         under_way && !self.settled(plan) && self.frozen >= ALIVE && self.changed_by(RIGID * plan.limit)
     }
 
+    /// The same where the torque cannot say so: the command has left the axis.
+    #[must_use]
+    pub fn left_behind(&self, plan: &Plan) -> bool {
+        self.frozen > self.frozen_limit && (self.profile.position - self.position).abs() > 0.1 * plan.retract
+    }
+
+    /// Whether the torque reading changes.
+    #[must_use]
+    pub fn alive(&self, plan: &Plan) -> bool {
+        self.same < plan.hold
+    }
+
     /// Whether a torque that stands at the limit is none: it did before the touch began.
     #[must_use]
     pub fn stuck_high(&self, plan: &Plan) -> bool {
@@ -241,6 +255,24 @@ impl Side {
             () => GIB_ERR_HOMING_TOUCHES,
         };
         (way < low).then_some(Fault { code, field, value: way, low, high: plan.retract })
+    }
+
+    /// What is wrong with a measured touch that ends elsewhere than the first did, by more than all of the way that a stop gives
+    /// under the limit: it was no stop, one time or the other.
+    #[must_use]
+    pub fn ended_elsewhere(&self, plan: &Plan, touches: &Touches) -> Option<Fault> {
+        let (way, high) = ((self.anchor - touches.first_end).abs(), touches.press(plan) + plan.standing_way);
+        let fault = Fault { field: "position_mm\0", value: way, ..Fault::of(GIB_ERR_HOMING_TOUCHES) };
+        (way > high).then_some(Fault { low: 0.0, high, ..fault })
+    }
+
+    /// What is wrong where a motor that was pressed goes on toward the stop, if anything: what it pressed on gives way. `press`: way
+    /// from contact to the limit.
+    #[must_use]
+    pub fn gives_way(&self, plan: &Plan, press: f64) -> Option<Fault> {
+        let (way, high) = (plan.sense * (self.position - self.anchor), press + plan.standing_way);
+        let fault = Fault { field: "position_mm\0", value: way, ..Fault::of(GIB_ERR_HOMING_TOUCHES) };
+        (way > high).then_some(Fault { low: 0.0, high, ..fault })
     }
 
     /// On the way out: an axis that was moving when it began to brake has not moved since.
