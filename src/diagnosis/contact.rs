@@ -44,14 +44,15 @@ pub fn settled(bench: &Bench, held_out: &HeldOut, found: Selection, watch: &Watc
     fits.retain(|fit| fit.squares() <= ALIKE * best.squares());
     // Where the best leaves little more than noise, so must what is taken in its place.
     let rattles = Excess::of(bench, &best, &best).largest() > LITTLE_LEFT;
-    let predicted = watch.each(&FROM_SOFT_TO_HARD, (0.91, 0.92), stage, |&hz| {
-        let fit = with_contact(&best, hz);
-        let may_be_taken = rattles || fit.squares() <= ALIKE * best.squares();
+    let itself_and_others: Vec<Option<f64>> = std::iter::once(None).chain(FROM_SOFT_TO_HARD.map(Some)).collect();
+    let predicted = watch.each(&itself_and_others, (0.91, 0.92), stage, |hz| {
+        let fit = hz.map_or_else(|| best.clone(), |hz| with_contact(&best, hz));
+        let may_be_taken = hz.is_none() || rattles || fit.squares() <= ALIKE * best.squares();
         (if may_be_taken { held_out.torque_error(&fit) } else { None }, fit)
     })?;
-    let own = (held_out.torque_error(&best), best);
     // Where a scale tells the table's motion, all predict alike, and the fit stays as it is.
     let error = |(error, _): &(Option<f64>, Fit)| error.unwrap_or(f64::INFINITY);
-    let (_, fit) = predicted.into_iter().fold(own, |best, next| if error(&next) < error(&best) { next } else { best });
+    let better = predicted.into_iter().reduce(|best, next| if error(&next) < error(&best) { next } else { best });
+    let fit = better.map_or(best, |(_, fit)| fit);
     Ok(Selection { fit, alike: fits, ..found })
 }

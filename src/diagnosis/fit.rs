@@ -4,9 +4,11 @@
 //! Linear coefficients are projected out (orthonormal basis by modified Gram–Schmidt, twice); non-linear parameters go by
 //! Gauss–Newton with step halving on what is left (variable projection, Golub and Pereyra 1973).
 
+mod beside;
 mod slopes;
 mod smoothed;
 
+pub use beside::Beside;
 pub use slopes::Slope;
 
 use super::causes::{Law, Rest, Term, Trace};
@@ -114,15 +116,6 @@ impl<'f, 'a> Bench<'f, 'a> {
         shapes.into_iter().zip(terms).map(part).collect()
     }
 
-    /// The same equations with more columns that are free in every fit.
-    #[must_use]
-    pub fn beside(&self, columns: impl Iterator<Item = Trace>) -> Self {
-        let mut free = self.free.clone();
-        columns.for_each(|column| free.push(orthonormal(&self.stack(&column), &free).0));
-        let (measured, known, windows) = (self.measured.clone(), self.known.clone(), self.windows.clone());
-        Self { free, measured, known, windows, ..*self }
-    }
-
     /// What is left, channel by channel, in their own units; rows of the torque by their weight.
     #[must_use]
     pub fn rest(&self, fit: &Fit) -> [Vec<f64>; 2] {
@@ -182,7 +175,10 @@ impl<'f, 'a> Bench<'f, 'a> {
             let mut c = column.to_vec();
             for direction in fit.basis.iter().chain(own) {
                 let along = dot(direction, &c);
-                add(&mut c, -along, direction);
+                // Levels of different channels have nothing in common.
+                if along != 0.0 {
+                    add(&mut c, -along, direction);
+                }
             }
             c
         };
@@ -191,7 +187,7 @@ impl<'f, 'a> Bench<'f, 'a> {
             // A start is not yet as large as it will be: without coefficients its trace counts by its form.
             let along = dot(&fixed, &residual) / dot(&fixed, &fixed).max(1e-300);
             let size = if part.columns.is_empty() { along.clamp(0.0, MOST_SIZE) } else { 1.0 };
-            residual.iter_mut().zip(fixed).for_each(|(r, f)| *r -= size * f);
+            add(&mut residual, -size, &fixed);
         }
         for column in part.columns.iter() {
             let mut c = clear(column, &own);

@@ -4,8 +4,7 @@
 
 mod laws;
 
-use super::causes::Trace;
-use super::fit::{Bench, Fit};
+use super::fit::{Bench, Fit, Part};
 use super::judge::{Excess, LITTLE_LEFT, MOST_OF_A_CURVE};
 use super::progress::{Stopped, Watch};
 use super::select::{LEAST_GAIN, NUMBER_PRICE, idle_left_out, price};
@@ -32,11 +31,10 @@ const STAGE: &str = "comparing with laws without a name";
 /// [`Stopped`] when the watch's caller said so.
 pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Result<Option<&'static str>, Stopped> {
     let explained = (empty.squares() - found.squares()).max(1e-300);
-    let beside =
-        |law: &Foreign, place: f64| bench.beside((law.regressors)(bench.frame, place).into_iter().map(Trace::torque));
+    let beside = |law: &Foreign, place: f64| bench.beside((law.regressors)(bench.frame, place));
     let first_place = |law: &&'static Foreign| {
         let places = if law.somewhere { 1..PLACES } else { 0..1 };
-        let alike = |place: f64| (empty.squares() - beside(law, place).fit(Vec::new()).squares()) / explained;
+        let alike = |place: f64| (empty.squares() - beside(law, place).fit(&[]).squares()) / explained;
         let tried = places.map(|place| place as f64 / PLACES as f64).map(|place| (alike(place), *law, place));
         tried.max_by(|a, b| a.0.total_cmp(&b.0))
     };
@@ -50,7 +48,7 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
     for (_, law, place) in near {
         let at_place = |place: f64| {
             let with = beside(law, place);
-            let fit = with.fit(found.parts.clone());
+            let fit = with.fit(&found.parts);
             (with, fit)
         };
         let (mut at, (mut with, mut fit)) = (place, at_place(place));
@@ -63,12 +61,14 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
                 }
             }
         }
-        let left = idle_left_out(&with, fit, watch)?;
+        let left = idle_left_out(&with.bench, fit, watch)?;
         let needless = found.parts.len() - left.parts.len();
         let better = price(found) - price(&left) - NUMBER_PRICE * law.numbers as f64;
         let more = found.squares() - left.squares();
         // What the causes that are still needed explain by themselves.
-        let own = bench.fit(left.parts).squares() - found.squares();
+        let stays = |part: &&Part| left.parts.iter().any(|l| l.law.cause == part.law.cause && l.shape == part.shape);
+        let needed: Vec<Part> = found.parts.iter().filter(stays).cloned().collect();
+        let own = bench.fit(needed).squares() - found.squares();
         let least = if needless > 1 { 0.0 } else { FOR_AS_MANY };
         // Any form also takes what one cause leaves by being not quite the law that the machine follows.
         let in_place = needless > 1 || needless == 1 && (!law.takes_any_form() || more > MOST_OF_A_CURVE * explained);

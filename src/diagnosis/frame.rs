@@ -286,10 +286,28 @@ impl<'a> Frame<'a> {
         self.judged(&(0..self.x.len()).map(value).collect::<Vec<_>>())
     }
 
-    /// Dry friction that fades where a function of the row is large: direction·e^−function.
+    /// The regressors of so many levels by where each row lies among them and its value: what lies between two belongs to both, by
+    /// how near it is.
     #[must_use]
-    pub fn fading(&self, function: impl Fn(usize) -> f64) -> Vec<f64> {
-        let mut friction: Vec<f64> = (0..self.x.len()).map(function).collect();
+    pub fn judged_by_levels(&self, levels: usize, rows: &[(f64, f64)]) -> Vec<Vec<f64>> {
+        let mut columns = vec![vec![0.0; self.kept.len()]; levels];
+        for (k, &row) in self.kept.iter().enumerate() {
+            let window =
+                row.checked_sub(self.kernel.len() / 2).and_then(|from| rows.get(from..from + self.kernel.len()));
+            for ((at, value), weight) in window.unwrap_or_default().iter().zip(&self.kernel) {
+                let level = (*at as usize).min(levels.saturating_sub(2));
+                let (near, far) = (at - level as f64, value * weight);
+                columns[level][k] += far * (1.0 - near);
+                columns[level + 1][k] += far * near;
+            }
+        }
+        columns
+    }
+
+    /// Dry friction that fades where a function of a column is large: direction·e^−function.
+    #[must_use]
+    pub fn fading(&self, column: &[f64], function: impl Fn(f64) -> f64) -> Vec<f64> {
+        let mut friction: Vec<f64> = column.iter().map(|value| function(*value)).collect();
         widest(
             #[inline(always)]
             || friction.iter_mut().zip(&self.direction).for_each(|(f, direction)| *f = direction * decay(*f)),

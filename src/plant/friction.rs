@@ -23,7 +23,8 @@ impl Friction {
     pub fn step(&mut self, mass: f64, impulse: f64, h: f64, v: f64, level: f64) -> f64 {
         if self.stiffness == 0.0 {
             let left = (impulse.abs() - h * level).max(0.0);
-            return left.copysign(impulse) / mass;
+            // A mass is the same in most steps, and a product is ready before a quotient.
+            return left.copysign(impulse) * (1.0 / mass);
         }
         if level <= 0.0 {
             self.force = 0.0;

@@ -39,6 +39,12 @@ struct Spot {
     per_width: f64,
 }
 
+/// e^−x. Beyond this the exponential is less than a rounding of what it is added to, and it is dear.
+#[inline]
+fn fading(x: f64) -> f64 {
+    if x < 40.0 { (-x).exp() } else { 0.0 }
+}
+
 /// The numbers of an axis, ready for evaluation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Physics {
@@ -146,18 +152,13 @@ impl Physics {
     pub fn friction_level(&self, x: f64, v: f64, t: f64) -> f64 {
         let mut level = self.coulomb;
         if let Some((torque, per_velocity)) = self.stribeck {
-            let square = (v * per_velocity) * (v * per_velocity);
-            // Beyond this the exponential is less than a rounding of the sum, and it is dear.
-            if square < 40.0 {
-                level += torque * (-square).exp();
-            }
+            level += torque * fading((v * per_velocity).powi(2));
         }
         for spot in &self.spots {
-            let distance = (x - spot.centre) * spot.per_width;
-            level += spot.peak * (-distance * distance).exp();
+            level += spot.peak * fading(((x - spot.centre) * spot.per_width).powi(2));
         }
         if let Some((drop, per_time)) = self.drift {
-            level += drop * (-t * per_time).exp();
+            level += drop * fading(t * per_time);
         }
         level.max(0.0)
     }

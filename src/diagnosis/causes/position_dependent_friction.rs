@@ -18,7 +18,8 @@ pub static LAW: Law = Law {
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let (centre, width) = place(frame, shape);
-            Term::torque(frame.fading(|i| ((frame.x[i] - centre) / width).powi(2)))
+            let per = 1.0 / width;
+            Term::torque(frame.fading(&frame.x, move |x| ((x - centre) * per).powi(2)))
         })
     },
     effect: |frame, shape, c| {

@@ -15,8 +15,8 @@ pub static LAW: Law = Law {
     simulated: false,
     terms: |frame, shapes| {
         each(shapes, |shape| {
-            let vs = shape[0];
-            Term::torque(frame.fading(|i| (frame.v[i] / vs).powi(2)))
+            let per = 1.0 / shape[0];
+            Term::torque(frame.fading(&frame.v, move |v| (v * per).powi(2)))
         })
     },
     effect: |frame, shape, c| {

@@ -12,8 +12,8 @@ pub static LAW: Law = Law {
     simulated: false,
     terms: |frame, shapes| {
         each(shapes, |shape| {
-            let tau = shape[0] * duration(frame);
-            Term::torque(frame.fading(|i| frame.seconds(i) / tau))
+            let (begin, per) = (frame.columns.time_s[0], 1.0 / (shape[0] * duration(frame)));
+            Term::torque(frame.fading(&frame.columns.time_s, move |time_s| (time_s - begin) * per))
         })
     },
     effect: |frame, shape, c| {

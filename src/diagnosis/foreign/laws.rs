@@ -202,14 +202,14 @@ fn any_form(frame: &Frame, along: impl Fn(usize) -> f64, of: impl Fn(usize) -> f
     let (low, high) = judged.fold((f64::MAX, f64::MIN), |(low, high), a| (a.min(low), a.max(high)));
     let per = (LEVELS - 1) as f64 / (high - low).max(1e-300);
     let rows = 0..frame.x.len();
-    let at: Vec<(f64, f64)> = rows.map(|i| (((along(i) - low) * per).clamp(0.0, (LEVELS - 1) as f64), of(i))).collect();
-    (0..LEVELS).map(|level| frame.judged_by(|i| at[i].1 * (1.0 - (at[i].0 - level as f64).abs()).max(0.0))).collect()
+    let at = |i: usize| ((along(i) - low) * per).clamp(0.0, (LEVELS - 1) as f64);
+    frame.judged_by_levels(LEVELS, &rows.map(|i| (at(i), of(i))).collect::<Vec<_>>())
 }
 
 /// Friction about one speed, over so many of the ways between two places.
 fn about(frame: &Frame, share: f64, ways: f64) -> Vec<f64> {
-    let top = frame.top_speed();
-    frame.fading(|i| ((frame.v[i].abs() / top - share) * PLACES as f64 / ways).powi(2))
+    let (per, at) = (PLACES as f64 / (ways * frame.top_speed()), share * PLACES as f64 / ways);
+    frame.fading(&frame.v, move |v| (v.abs() * per - at).powi(2))
 }
 
 /// Way since the axis rested or turned last, load units, every row.

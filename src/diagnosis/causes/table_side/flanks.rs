@@ -80,20 +80,22 @@ impl<const N: usize> Tables<'_, N> {
         let (per_step, per_span) = (1.0 / self.steps as f64, 1.0 / self.frame.columns.period_s);
         let half_step = 0.5 * self.step_s;
         let motor_mobility = self.motor_inertia.map(|j| self.step_s / j);
-        let (mut x, mut v) = (state.position, state.speed);
+        // Each step waits for the one before it: what does not depend on that is worked out beside it, not within.
+        let pull = self.mobility.map(|m| m * self.frame.belief.constant);
+        let slack = lanes::<N>(|l| self.stiffness[l] * self.half[l]);
+        let mut v = state.speed;
+        let mut middle: [f64; N] = lanes(|l| state.position[l] + half_step * v[l]);
         let [mut give, mut giving, mut answered] = state.given;
         let (mut sum, mut far, mut least) = ([0.0; N], [0.0; N], [f64::INFINITY; N]);
         for step in 0..self.steps {
             let s = (step as f64 + 0.5) * per_step;
             let (motor, speed) = (way.position(s), way.speed(s) * per_span);
             for l in 0..N {
-                let middle = x[l] + half_step * v[l];
-                let wind = motor - middle + give[l];
+                let wind = (motor + give[l]) - middle[l];
                 // Flanks push and never pull.
-                let outward = (speed + giving[l] - v[l]) * 1.0f64.copysign(wind);
-                let beyond = wind.abs() - self.half[l];
-                let spring = larger(self.stiffness[l] * beyond + self.damping[l] * outward, 0.0);
-                let push = if beyond > 0.0 { spring } else { 0.0 };
+                let outward = self.damping[l] * ((speed + giving[l]) - v[l]);
+                let spring = self.stiffness[l] * wind.abs() + (outward * 1.0f64.copysign(wind) - slack[l]);
+                let push = if wind.abs() > self.half[l] { larger(spring, 0.0) } else { 0.0 };
                 least[l] = smaller(push, least[l]);
                 let push = push.copysign(wind);
                 [give[l], giving[l], answered[l]] =
@@ -101,11 +103,13 @@ impl<const N: usize> Tables<'_, N> {
                 sum[l] += push;
                 far[l] += s * push;
                 // Dry friction takes what speed it can, and never turns it.
-                let free = self.kept[l] * v[l] + self.mobility[l] * (push - self.frame.belief.constant);
+                let free = (self.kept[l] * v[l] - pull[l]) + self.mobility[l] * push;
                 v[l] = free - larger(smaller(free, self.dry[l]), -self.dry[l]);
-                x[l] = middle + half_step * v[l];
+                middle[l] += self.step_s * v[l];
             }
         }
+        // The last step ends in the middle of one that is not made.
+        let x = lanes(|l| middle[l] - half_step * v[l]);
         (state.position, state.speed, state.side) = (x, v, sum);
         state.given = [give, giving, answered];
         for l in 0..N {
