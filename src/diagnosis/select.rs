@@ -226,17 +226,42 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
         *count <= TRIED && child.within_reach() < carried_on
     });
     let refined = watch.each(&children, (half, to), "fitting causes", |Child { set, part, .. }| {
-        let mut parts = set.parts.clone();
-        parts.push(part.clone());
-        let count = set.parts.len();
-        let fit = bench.refine_roughly(bench.fit(parts), count, 6);
-        let fit = bench.refine_roughly(fit, 0, if count == 0 { 4 } else { 2 });
+        let fit = refined(bench, set, part.clone());
+        let fit = if is_physical(bench, &fit) { fit } else { put_right(bench, set, fit) };
         (is_physical(bench, &fit) && once_only(bench, &fit).is_none() && price(&fit) < price(set) - 0.5 * LEAST_GAIN)
             .then_some(fit)
     })?;
     let mut grown: Vec<Fit> = refined.into_iter().flatten().collect();
     grown.sort_by(|a, b| price(a).total_cmp(&price(b)));
     Ok(grown)
+}
+
+/// A set with a cause more, first fitted by itself, then with the others.
+fn refined(bench: &Bench, set: &Fit, part: Part) -> Fit {
+    let mut parts = set.parts.clone();
+    parts.push(part);
+    let count = set.parts.len();
+    let fit = bench.refine_roughly(bench.fit(parts), count, 6);
+    bench.refine_roughly(fit, 0, if count == 0 { 4 } else { 2 })
+}
+
+/// What a set with a cause more becomes that was fitted beyond physical bounds: without those of before that the new one has made
+/// needless, or with the new one from other starts where it is itself what has strayed.
+fn put_right(bench: &Bench, set: &Fit, fit: Fit) -> Fit {
+    let strayed =
+        |i: &usize| (fit.parts[*i].law.effect)(bench.frame, &fit.parts[*i].shape, &fit.coefficients[*i]).is_none();
+    let Some(new) = fit.parts.len().checked_sub(1) else { return fit };
+    if !strayed(&new) {
+        let sound = (0..=new).filter(|i| !strayed(i)).map(|i| fit.parts[i].clone()).collect();
+        return bench.refine_roughly(bench.fit(sound), 0, 2);
+    }
+    let Part { law, shape, .. } = &fit.parts[new];
+    let starts = bench.parts(law, (law.restarts)(shape)).into_iter();
+    let starts = starts.map(|part| (figure(&bench.joined(set, &part)), part));
+    match starts.min_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((_, part)) => refined(bench, set, part),
+        None => fit,
+    }
 }
 
 /// A law where it explains most of what a set leaves, if that is worth refining; a ripple of few periods beside a fine one.

@@ -23,6 +23,7 @@ pub static LAW: Law = Law {
         let at = |w| [0.33, 0.52].map(|table| [0.5, 0.67, 0.84].map(|friction| vec![w, table, friction, 700.0]));
         widths.flat_map(|w| at(w).into_iter().flatten()).collect()
     },
+    restarts: NO_RESTARTS,
     starts_from_rest: false,
     approached: true,
     simulated: true,

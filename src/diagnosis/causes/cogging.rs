@@ -8,6 +8,7 @@ pub static LAW: Law = Law {
     cause: Cause::Cogging,
     scales: &[Scale::Linear(1.0, 1e6, 0.02)],
     starts: |frame, rest| periods::along_stroke(frame, rest.torque),
+    restarts: NO_RESTARTS,
     starts_from_rest: true,
     approached: false,
     simulated: false,

@@ -7,6 +7,7 @@ pub static LAW: Law = Law {
     cause: Cause::CoulombFrictionMismatch,
     scales: &[],
     starts: one_start,
+    restarts: NO_RESTARTS,
     starts_from_rest: false,
     approached: false,
     simulated: false,

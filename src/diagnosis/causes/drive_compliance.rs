@@ -28,6 +28,14 @@ pub static LAW: Law = Law {
         let count = ((most / least).ln() / STEP.ln()).ceil().max(2.0) as usize;
         log_spaced(least, most, count).map(|own| vec![own / (1.0 - share).sqrt(), share, 0.7, 0.04]).collect()
     },
+    // How the table swings by itself is found sooner than what is whose: a fit that damps it until it hardly swings has found the one
+    // and strayed in the other.
+    restarts: |shape| {
+        let [resonance, share, ..] = shape else { return Vec::new() };
+        let own = resonance * (1.0 - share).sqrt();
+        let at = |share: f64| [0.5, 0.95].map(|friction| vec![own / (1.0 - share).sqrt(), share, friction, 0.04]);
+        [0.2, 0.45, 0.7, 0.85].into_iter().flat_map(at).collect()
+    },
     starts_from_rest: false,
     approached: false,
     simulated: true,

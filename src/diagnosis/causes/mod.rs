@@ -96,6 +96,8 @@ pub struct Law {
     pub scales: &'static [Scale],
     /// Starts of the non-linear parameters; none where this recording cannot show the cause.
     pub starts: fn(&Frame, &Rest) -> Vec<Vec<f64>>,
+    /// Starts anew from where a fit has strayed beyond the bounds, by what it has found all the same.
+    pub restarts: fn(&[f64]) -> Vec<Vec<f64>>,
     /// Whether the starts depend on what is left.
     pub starts_from_rest: bool,
     /// Whether the sum of squares is so rugged about the right parameters that they are approached from afar.
@@ -111,6 +113,9 @@ pub struct Law {
     /// What it says to a machinist.
     pub sentence: fn(&Effect, &Axis) -> String,
 }
+
+/// Of a law that does not stray.
+const NO_RESTARTS: fn(&[f64]) -> Vec<Vec<f64>> = |_| Vec::new();
 
 impl std::fmt::Debug for Law {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -12,6 +12,7 @@ pub static LAW: Law = Law {
             .flat_map(|(width, count)| (0..count).map(move |i| vec![(f64::from(i) + 0.5) / f64::from(count), width]))
             .collect()
     },
+    restarts: NO_RESTARTS,
     starts_from_rest: false,
     approached: false,
     simulated: false,

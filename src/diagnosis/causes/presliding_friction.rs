@@ -11,6 +11,7 @@ pub static LAW: Law = Law {
         let least = (3.0 * frame.grid).max(3e-4) * 1e3;
         log_spaced(least, (least * 10.0).max(500.0), 14).map(|d| vec![d]).collect()
     },
+    restarts: NO_RESTARTS,
     starts_from_rest: false,
     approached: false,
     simulated: false,

@@ -7,6 +7,7 @@ pub static LAW: Law = Law {
     cause: Cause::ScrewPeriodicError,
     scales: &[Scale::Linear(1.0, 1e6, 0.02)],
     starts: |frame, rest| if rest.table.is_empty() { Vec::new() } else { periods::along_stroke(frame, rest.table) },
+    restarts: NO_RESTARTS,
     starts_from_rest: true,
     approached: false,
     simulated: false,
