@@ -274,12 +274,16 @@ static void see_world(homing_adversary *a, const gib_homing_input *in)
     a->set |= p->out.phase == GIB_HOMING_SET;
     int unlimited = !a->limited || a->set || ever(a, FAULT_LIMIT_IGNORED) || ever(a, FAULT_LIMIT_LOST) ||
                     ever(a, FAULT_ENCODER_JUMPS) || struck(a);
+    /* After the end the kernel's servo may pull at what still holds the axis. */
+    unlimited |= a->ended && ever(a, FAULT_TIGHT_SPOT);
     for (int i = 0; i < p->c.motors; i++) {
         const homing_plant_side *s = &p->side[i];
         double lie = s->x - p->c.sense * in->position_mm[i];
         a->lie_mm[i] = isfinite(lie) ? fmax(a->lie_mm[i], lie) : a->lie_mm[i];
-        /* A stop that breaks away or gives way lets go of an axis under torque, which no command holds at once. */
+        /* A stop that breaks away or gives way lets go of an axis under torque, which no command holds at once, and none
+         * at all while its encoder stands. */
         double flies = ever(a, FAULT_STOP_GONE) || ever(a, FAULT_STOP_SOFT) ? 1.0 : 0.0;
+        flies = flies > 0.0 && ever(a, FAULT_ENCODER_FROZEN) ? INFINITY : flies;
         law(a, s->y <= g->distance_max_mm + p->c.clearance_mm + a->lie_mm[i] + flies, "the way");
         /* A drive that limits late takes the time of its current loop to come down. */
         int falls = a->limited && fabs(s->torque) < a->torque_nm[i];
@@ -406,7 +410,9 @@ static void see_home(homing_adversary *a)
     int hidden = lasts_till(a, FAULT_ENCODER_FROZEN, a->ended) || 0.01 + 10.0 * fmax(approach, offset) * c->cycle_s > 0.3;
     int jumped = ever(a, FAULT_ENCODER_JUMPS) && hidden;
     int unset = (g->unacknowledged & GIB_HOMING_REQUEST_SET_POSITION) && ever(a, FAULT_NO_ACKNOWLEDGEMENT);
-    if (jumped || unset || ever(a, FAULT_STOP_EARLY) || ever(a, FAULT_CHIPS) || c->stop_mm[0] != c->stop_mm[1] ||
+    /* A torque that stands for a part of the only touch: no other disagrees with it. */
+    int unequalled = g->touches == 1 && ever(a, FAULT_TORQUE_STUCK_HIGH);
+    if (jumped || unset || unequalled || ever(a, FAULT_STOP_EARLY) || ever(a, FAULT_CHIPS) || c->stop_mm[0] != c->stop_mm[1] ||
         g->method == GIB_HOMING_THRESHOLD) {
         return;
     }

@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-enum { KNOWN_SEED = 20260101, KNOWN_RUNS = 2000, FRESH_RUNS = 200 };
+enum { KNOWN_SEED = 20260101, KNOWN_RUNS = 2000, FRESH_RUNS = 100 };
 
 static uint64_t fresh_seed;
 static int fresh_runs = FRESH_RUNS;
