@@ -358,7 +358,7 @@ impl Side {
     /// Takes note of the torque that holds or moves the axis where nothing is touched: an axis with gravity needs it on the way out.
     pub fn holds(&mut self, plan: &Plan, torque: f64) {
         if torque.is_finite() {
-            self.holds = torque.clamp(-0.5 * plan.threshold, 0.5 * plan.threshold);
+            self.holds = lower(higher(torque, -0.5 * plan.threshold), 0.5 * plan.threshold);
         }
     }
 
