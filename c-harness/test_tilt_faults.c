@@ -338,10 +338,13 @@ static void wrong_calls_are_refused(void **state)
     assert_int_equal(gib_tilt_start(gib, &longer.config, &table), GIB_ERR_STRUCT_SIZE);
     longer.later = 0.0;
     assert_int_equal(gib_tilt_start(gib, &longer.config, &table), GIB_OK);
-    /* Busy. */
+    /* Busy: that must not hide why the run fails. */
     assert_int_equal(gib_tilt_start(gib, &config, &table), GIB_ERR_STATE);
     gib_tilt_last_error(gib, &detail);
-    assert_int_equal(detail.code, GIB_ERR_STATE);
+    assert_int_equal(detail.code, GIB_OK);
+    gib_tilt_abort(gib);
+    gib_tilt_last_error(gib, &detail);
+    assert_int_equal(detail.code, GIB_ERR_ABORTED);
     gib_tilt_free(gib);
 }
 

@@ -4676,7 +4676,8 @@ int32_t gib_backlash_compare(struct gib_backlash *handle,
                              struct gib_backlash_comparison *comparison);
 
 /**
- * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
+ * GIB_ERR_STATE changes nothing here.
  *
  * @param handle the instance.
  * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
@@ -4687,7 +4688,8 @@ int32_t gib_backlash_compare(struct gib_backlash *handle,
  * # Safety
  * `handle` is NULL or an instance; `detail` is NULL or writable.
  */
-int32_t gib_backlash_last_error(const struct gib_backlash *handle, struct gib_error_detail *detail);
+int32_t gib_backlash_last_error(const struct gib_backlash *handle,
+                                struct gib_error_detail *detail);
 
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
@@ -4838,7 +4840,8 @@ int32_t gib_calibration_load(struct gib_calibration *handle,
                              const char *path);
 
 /**
- * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
+ * GIB_ERR_STATE changes nothing here.
  *
  * @param handle the instance.
  * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
@@ -4849,7 +4852,8 @@ int32_t gib_calibration_load(struct gib_calibration *handle,
  * # Safety
  * `handle` is NULL or an instance; `detail` is NULL or writable.
  */
-int32_t gib_calibration_last_error(const struct gib_calibration *handle, struct gib_error_detail *detail);
+int32_t gib_calibration_last_error(const struct gib_calibration *handle,
+                                   struct gib_error_detail *detail);
 
 /**
  * Makes an empty instance.
@@ -5449,7 +5453,8 @@ int32_t gib_learning_load(struct gib_learning *handle,
                           const char *path);
 
 /**
- * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
+ * GIB_ERR_STATE changes nothing here.
  *
  * @param handle the instance.
  * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
@@ -5460,7 +5465,8 @@ int32_t gib_learning_load(struct gib_learning *handle,
  * # Safety
  * `handle` is NULL or an instance; `detail` is NULL or writable.
  */
-int32_t gib_learning_last_error(const struct gib_learning *handle, struct gib_error_detail *detail);
+int32_t gib_learning_last_error(const struct gib_learning *handle,
+                                struct gib_error_detail *detail);
 
 /**
  * Makes an empty instance.
@@ -6172,7 +6178,8 @@ int32_t gib_tilt_abort(struct gib_tilt *handle);
 int32_t gib_tilt_result(const struct gib_tilt *handle, struct gib_tilt_report *report);
 
 /**
- * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
+ * GIB_ERR_STATE changes nothing here.
  *
  * @param handle the instance.
  * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
@@ -6183,7 +6190,8 @@ int32_t gib_tilt_result(const struct gib_tilt *handle, struct gib_tilt_report *r
  * # Safety
  * `handle` is NULL or an instance; `detail` is NULL or writable.
  */
-int32_t gib_tilt_last_error(const struct gib_tilt *handle, struct gib_error_detail *detail);
+int32_t gib_tilt_last_error(const struct gib_tilt *handle,
+                            struct gib_error_detail *detail);
 
 /**
  * Adds a cut to a table: a new row in the order of depth, or a further cut of a depth that is there.
@@ -6395,7 +6403,8 @@ int32_t gib_vibration_abort(struct gib_vibration *handle);
 int32_t gib_vibration_result(const struct gib_vibration *handle, struct gib_vibration_report *report);
 
 /**
- * The first error of the present run, or why the last call was refused: code, field, value and bounds.
+ * The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
+ * GIB_ERR_STATE changes nothing here.
  *
  * @param handle the instance.
  * @param detail receives it; its `code` is GIB_OK when nothing went wrong.
@@ -6406,7 +6415,8 @@ int32_t gib_vibration_result(const struct gib_vibration *handle, struct gib_vibr
  * # Safety
  * `handle` is NULL or an instance; `detail` is NULL or writable.
  */
-int32_t gib_vibration_last_error(const struct gib_vibration *handle, struct gib_error_detail *detail);
+int32_t gib_vibration_last_error(const struct gib_vibration *handle,
+                                 struct gib_error_detail *detail);
 
 #ifdef __cplusplus
 }  // extern "C"

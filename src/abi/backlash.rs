@@ -1,6 +1,6 @@
 //! Family `backlash`: lost motion of one axis from motor torque, as seen from C.
 
-use super::guard::{Instance, guarded, instance, instance_mut, placed, versioned};
+use super::guard::{Instance, guarded, instance, instance_mut, kept, placed, versioned};
 use super::types::GibErrorDetail;
 use crate::cycle::backlash::config::BacklashConfig;
 use crate::cycle::backlash::io::{BacklashInput, BacklashOutput, GIB_BACKLASH_FAILED};
@@ -47,16 +47,7 @@ impl GibBacklash {
 fn refusable(handle: &mut GibBacklash, call: impl FnOnce(&mut Backlash) -> Result<(), Fault>) -> i32 {
     let outcome = call(&mut handle.machine);
     handle.mark();
-    match outcome {
-        Ok(()) => {
-            handle.last = Fault::NONE;
-            GIB_OK
-        }
-        Err(fault) => {
-            handle.last = fault;
-            fault.code
-        }
-    }
+    kept(&mut handle.last, outcome)
 }
 
 /// Bytes that an instance needs in memory of your own, to be aligned to 16.
@@ -394,7 +385,8 @@ pub unsafe extern "C" fn gib_backlash_compare(
     })
 }
 
-/// The first error of the present run, or why the last call was refused: code, field, value and bounds.
+/// The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
+/// GIB_ERR_STATE changes nothing here.
 ///
 /// @param handle the instance.
 /// @param detail receives it; its `code` is GIB_OK when nothing went wrong.

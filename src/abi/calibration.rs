@@ -1,6 +1,6 @@
 //! Family `calibration`: accelerometers against a ball bar, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, placed, versioned};
+use super::guard::{guarded, instance, instance_mut, kept, placed, versioned};
 use super::text::path_of;
 use super::types::GibErrorDetail;
 use crate::cycle::calibration::config::CalibrationConfig;
@@ -32,14 +32,6 @@ impl super::guard::Instance for GibCalibration {
     }
     fn bury(&mut self) {
         self.alive = 0;
-    }
-}
-
-impl GibCalibration {
-    /// Keeps why a call was refused, for `_last_error`; returns its status.
-    fn keep(&mut self, refused: Option<Fault>) -> i32 {
-        self.last = refused.unwrap_or(Fault::NONE);
-        self.last.code
     }
 }
 
@@ -119,8 +111,8 @@ pub unsafe extern "C" fn gib_calibration_start(handle: *mut GibCalibration, conf
         let handle = unsafe { instance_mut(handle) }?;
         // SAFETY: the caller's promise; the config is plain numbers.
         let config = unsafe { versioned(config, CalibrationConfig::FIRST_SIZE) }?;
-        let refused = handle.machine.start(Plan::new(&config)).err();
-        Ok(handle.keep(refused))
+        let outcome = handle.machine.start(Plan::new(&config));
+        Ok(kept(&mut handle.last, outcome))
     })
 }
 
@@ -244,8 +236,8 @@ pub unsafe extern "C" fn gib_calibration_save(handle: *mut GibCalibration, path:
         // SAFETY: the caller's promise.
         let (handle, path) = unsafe { (instance_mut(handle)?, path_of(path)?) };
         let known = handle.machine.table().ok_or(Fault::of(GIB_ERR_STATE));
-        let refused = known.and_then(|table| calibration::save(table, path)).err();
-        Ok(handle.keep(refused))
+        let outcome = known.and_then(|table| calibration::save(table, path));
+        Ok(kept(&mut handle.last, outcome))
     })
 }
 
@@ -266,12 +258,13 @@ pub unsafe extern "C" fn gib_calibration_load(handle: *mut GibCalibration, path:
         // SAFETY: the caller's promise.
         let (handle, path) = unsafe { (instance_mut(handle)?, path_of(path)?) };
         let read = if handle.machine.busy() { Err(Fault::of(GIB_ERR_STATE)) } else { calibration::load(path) };
-        let refused = read.map(|table| handle.machine.install(table)).err();
-        Ok(handle.keep(refused))
+        let outcome = read.map(|table| handle.machine.install(table));
+        Ok(kept(&mut handle.last, outcome))
     })
 }
 
-/// The first error of the present run, or why the last call was refused: code, field, value and bounds.
+/// The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
+/// GIB_ERR_STATE changes nothing here.
 ///
 /// @param handle the instance.
 /// @param detail receives it; its `code` is GIB_OK when nothing went wrong.

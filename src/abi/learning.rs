@@ -1,6 +1,6 @@
 //! Family `learning`: a command that is learnt from revolution to revolution, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, placed, versioned};
+use super::guard::{guarded, instance, instance_mut, kept, placed, versioned};
 use super::text::path_of;
 use super::types::GibErrorDetail;
 use crate::cycle::learning::config::LearningConfig;
@@ -31,14 +31,6 @@ impl super::guard::Instance for GibLearning {
     }
     fn bury(&mut self) {
         self.alive = 0;
-    }
-}
-
-impl GibLearning {
-    /// Keeps why a call was refused, for `_last_error`; returns its status.
-    fn keep(&mut self, refused: Option<Fault>) -> i32 {
-        self.last = refused.unwrap_or(Fault::NONE);
-        self.last.code
     }
 }
 
@@ -114,8 +106,8 @@ pub unsafe extern "C" fn gib_learning_start(handle: *mut GibLearning, config: *c
         let handle = unsafe { instance_mut(handle) }?;
         // SAFETY: the caller's promise; the config is plain numbers.
         let config = unsafe { versioned(config, LearningConfig::FIRST_SIZE) }?;
-        let refused = handle.machine.start(Plan::new(&config)).err();
-        Ok(handle.keep(refused))
+        let outcome = handle.machine.start(Plan::new(&config));
+        Ok(kept(&mut handle.last, outcome))
     })
 }
 
@@ -276,7 +268,7 @@ pub unsafe extern "C" fn gib_learning_save(handle: *mut GibLearning, path: *cons
             let points: Vec<LearningPoint> = (0..machine.count()).map(|i| machine.point(i)).collect();
             learning::save(&points, machine.report().speed_rpm, path)
         };
-        Ok(handle.keep(saved.err()))
+        Ok(kept(&mut handle.last, saved))
     })
 }
 
@@ -297,12 +289,13 @@ pub unsafe extern "C" fn gib_learning_load(handle: *mut GibLearning, path: *cons
         // SAFETY: the caller's promise.
         let (handle, path) = unsafe { (instance_mut(handle)?, path_of(path)?) };
         let read = if handle.machine.busy() { Err(Fault::of(GIB_ERR_STATE)) } else { learning::load(path) };
-        let refused = read.map(|points| handle.machine.install(points.into_iter())).err();
-        Ok(handle.keep(refused))
+        let outcome = read.map(|points| handle.machine.install(points.into_iter()));
+        Ok(kept(&mut handle.last, outcome))
     })
 }
 
-/// The first error of the present run, or why the last call was refused: code, field, value and bounds.
+/// The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
+/// GIB_ERR_STATE changes nothing here.
 ///
 /// @param handle the instance.
 /// @param detail receives it; its `code` is GIB_OK when nothing went wrong.

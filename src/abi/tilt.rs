@@ -1,6 +1,6 @@
 //! Family `tilt`: tilt of the workpiece plane from spindle load, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, placed, versioned};
+use super::guard::{guarded, instance, instance_mut, kept, placed, versioned};
 use super::types::GibErrorDetail;
 use crate::cycle::tilt::config::{GIB_TILT_TEACH, TiltConfig};
 use crate::cycle::tilt::io::{GIB_TILT_FAILED, TiltInput, TiltOutput};
@@ -40,16 +40,7 @@ impl super::guard::Instance for GibTilt {
 
 /// Runs a call that can be refused, and keeps the reason for `_last_error`.
 fn refusable(handle: &mut GibTilt, call: impl FnOnce(&mut Tilt) -> Result<(), Fault>) -> i32 {
-    match call(&mut handle.machine) {
-        Ok(()) => {
-            handle.last = Fault::NONE;
-            GIB_OK
-        }
-        Err(fault) => {
-            handle.last = fault;
-            fault.code
-        }
-    }
+    kept(&mut handle.last, call(&mut handle.machine))
 }
 
 /// Bytes that an instance needs in memory of your own, to be aligned to 16.
@@ -228,7 +219,8 @@ pub unsafe extern "C" fn gib_tilt_result(handle: *const GibTilt, report: *mut Ti
     })
 }
 
-/// The first error of the present run, or why the last call was refused: code, field, value and bounds.
+/// The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
+/// GIB_ERR_STATE changes nothing here.
 ///
 /// @param handle the instance.
 /// @param detail receives it; its `code` is GIB_OK when nothing went wrong.

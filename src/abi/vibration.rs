@@ -1,6 +1,6 @@
 //! Family `vibration`: tool position corrected for vibration, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, placed, versioned};
+use super::guard::{guarded, instance, instance_mut, kept, placed, versioned};
 use super::types::GibErrorDetail;
 use crate::cycle::calibration::table::CalibrationTable;
 use crate::cycle::vibration::config::VibrationConfig;
@@ -112,9 +112,8 @@ pub unsafe extern "C" fn gib_vibration_start(
         // SAFETY: the caller's promise; the table is plain numbers.
         let read = || unsafe { versioned(table, CalibrationTable::FIRST_SIZE) };
         let table = if table.is_null() { None } else { Some(read()?) };
-        let refused = handle.machine.start(Plan::new(&config, table.as_ref())).err();
-        handle.last = refused.unwrap_or(Fault::NONE);
-        Ok(handle.last.code)
+        let outcome = handle.machine.start(Plan::new(&config, table.as_ref()));
+        Ok(kept(&mut handle.last, outcome))
     })
 }
 
@@ -212,7 +211,8 @@ pub unsafe extern "C" fn gib_vibration_result(handle: *const GibVibration, repor
     })
 }
 
-/// The first error of the present run, or why the last call was refused: code, field, value and bounds.
+/// The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
+/// GIB_ERR_STATE changes nothing here.
 ///
 /// @param handle the instance.
 /// @param detail receives it; its `code` is GIB_OK when nothing went wrong.

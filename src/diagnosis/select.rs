@@ -248,12 +248,13 @@ fn refined(bench: &Bench, set: &Fit, part: Part) -> Fit {
 /// What a set with a cause more becomes that was fitted beyond physical bounds: without those of before that the new one has made
 /// needless, or with the new one from other starts where it is itself what has strayed.
 fn put_right(bench: &Bench, set: &Fit, fit: Fit) -> Fit {
-    let strayed =
-        |i: &usize| (fit.parts[*i].law.effect)(bench.frame, &fit.parts[*i].shape, &fit.coefficients[*i]).is_none();
+    let sound: Vec<usize> = (0..fit.parts.len()).filter(|i| is_within_bounds(bench, &fit, *i)).collect();
     let Some(new) = fit.parts.len().checked_sub(1) else { return fit };
-    if !strayed(&new) {
-        let sound = (0..=new).filter(|i| !strayed(i)).map(|i| fit.parts[i].clone()).collect();
-        return bench.refine_roughly(bench.fit(sound), 0, 2);
+    if sound.len() > new {
+        return fit; // all are, but a ripple is there twice
+    }
+    if sound.contains(&new) {
+        return bench.refine_roughly(bench.fit(sound.iter().map(|i| fit.parts[*i].clone()).collect()), 0, 2);
     }
     let Part { law, shape, .. } = &fit.parts[new];
     let starts = bench.parts(law, (law.restarts)(shape)).into_iter();
@@ -307,8 +308,12 @@ pub fn is_physical(bench: &Bench, fit: &Fit) -> bool {
     let mut few: Vec<Cause> = few.collect();
     few.sort();
     let one_of_each = few.windows(2).all(|pair| pair[0] != pair[1]);
-    one_of_each
-        && fit.parts.iter().zip(&fit.coefficients).all(|(p, c)| (p.law.effect)(bench.frame, &p.shape, c).is_some())
+    one_of_each && (0..fit.parts.len()).all(|i| is_within_bounds(bench, fit, i))
+}
+
+fn is_within_bounds(bench: &Bench, fit: &Fit, part: usize) -> bool {
+    let Part { law, shape, .. } = &fit.parts[part];
+    (law.effect)(bench.frame, shape, &fit.coefficients[part]).is_some()
 }
 
 /// Drops causes that the others do without as they are, weakest first: refined, the others would do without them all the more.
