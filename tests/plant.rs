@@ -136,7 +136,7 @@ fn a_clearance_is_crossed_without_torque_on_the_table() {
 fn the_plant_converges_with_its_step() {
     let effects = [
         Effect::Backlash { width_um: 20.0, table_inertia_share: 0.4, table_friction_share: 0.6, contact_hz: 400.0 },
-        Effect::PreslidingFriction { displacement_um: 8.0 },
+        Effect::PreslidingFriction { displacement_um: 8.0, exponent: 1.0, maxwell_slip: 0.0, micro_damping_s: 0.0 },
         Effect::StribeckFriction { torque: 0.3, velocity_mm_s: 4.0 },
     ];
     for effects in [&effects[..0], &effects[1..], &effects[..]] {
@@ -201,7 +201,7 @@ fn every_cause_of_torque_is_predicted() {
         Effect::ConstantTorque { torque: 0.4 },
         Effect::DirectionDependentFriction { asymmetry: 0.003 },
         Effect::StribeckFriction { torque: 0.6, velocity_mm_s: 20.0 },
-        Effect::PreslidingFriction { displacement_um: 400.0 },
+        Effect::PreslidingFriction { displacement_um: 400.0, exponent: 1.0, maxwell_slip: 0.0, micro_damping_s: 0.0 },
         Effect::DriveCompliance {
             resonance_hz: 32.0,
             stiffness_n_um: 10.0,

@@ -85,8 +85,11 @@ pub fn reconcile<'e>(axis: &Axis, found: impl Iterator<Item = &'e mut Effect>) {
 /// same stiffness.
 fn of_level(effect: Effect, coulomb: f64, more: f64) -> Effect {
     match effect {
-        Effect::PreslidingFriction { displacement_um } if coulomb > 0.0 && coulomb + more > 0.0 => {
-            Effect::PreslidingFriction { displacement_um: displacement_um * coulomb / (coulomb + more) }
+        Effect::PreslidingFriction { displacement_um, exponent, maxwell_slip, micro_damping_s }
+            if coulomb > 0.0 && coulomb + more > 0.0 =>
+        {
+            let displacement_um = displacement_um * coulomb / (coulomb + more);
+            Effect::PreslidingFriction { displacement_um, exponent, maxwell_slip, micro_damping_s }
         }
         other => other,
     }
@@ -181,14 +184,20 @@ mod tests {
 
     #[test]
     fn friction_builds_up_to_the_level_at_rest() {
+        let presliding = |displacement_um| Effect::PreslidingFriction {
+            displacement_um,
+            exponent: 1.0,
+            maxwell_slip: 0.0,
+            micro_damping_s: 0.0,
+        };
         let axis = Axis { effects: Vec::new(), ..axis() };
         let mut found = [
             Effect::CoulombFrictionMismatch { torque: 0.9 },
             Effect::StribeckFriction { torque: 0.3, velocity_mm_s: 5.0 },
-            Effect::PreslidingFriction { displacement_um: 66.0 },
+            presliding(66.0),
         ];
         reconcile(&axis, found.iter_mut());
-        assert_eq!(found[2], Effect::PreslidingFriction { displacement_um: 66.0 * 0.9 / (0.9 + 0.3) });
+        assert_eq!(found[2], presliding(66.0 * 0.9 / (0.9 + 0.3)));
         assert_eq!(found[0], Effect::CoulombFrictionMismatch { torque: 0.9 });
     }
 

@@ -78,7 +78,10 @@ fn by_its_law(frame: &Frame, effect: &Effect) -> Option<(Vec<f64>, Vec<f64>)> {
     Some(match *effect {
         DirectionDependentFriction { asymmetry } => (vec![], vec![asymmetry]),
         StribeckFriction { torque, velocity_mm_s } => (vec![velocity_mm_s], vec![torque]),
-        PreslidingFriction { displacement_um } => (vec![displacement_um], vec![frame.belief.coulomb]),
+        PreslidingFriction { displacement_um, exponent, maxwell_slip, micro_damping_s } => (
+            vec![displacement_um, exponent, maxwell_slip],
+            vec![frame.belief.coulomb, frame.belief.coulomb * micro_damping_s],
+        ),
         Cogging { amplitude, period_mm } => (vec![stroke / period_mm], vec![amplitude]),
         PositionDependentFriction { centre_mm, peak, width_mm } => {
             (vec![(centre_mm - low) / stroke, width_mm / stroke], vec![peak])

@@ -52,7 +52,7 @@ const LEAST_SHARE: f64 = 0.001;
 const BEATS: f64 = 4.0;
 
 /// Least size of a cause in its standard deviations: it must be known to be there at all.
-const LEAST_STRENGTH: f64 = 2.5;
+pub const LEAST_STRENGTH: f64 = 2.5;
 
 /// The set of causes that explains the recording best, and the runners-up for its first cause.
 #[derive(Debug)]
@@ -337,7 +337,10 @@ pub fn idle_left_out(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, 
 }
 
 /// Drops causes that the others can do without, and those that held-out blocks do not bear out.
-fn shrink(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
+///
+/// # Errors
+/// [`Stopped`] when the watch's caller said so.
+pub fn shrink(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
     fit = bench.refine(fit, 0, 8);
     while !fit.parts.is_empty() {
         let each: Vec<usize> = (0..fit.parts.len()).collect();

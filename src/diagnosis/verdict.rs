@@ -333,7 +333,8 @@ fn confidence(bench: &Bench, fit: &Fit, part: usize) -> f64 {
 }
 
 /// Mean over scatter of the blocks' gains, times √blocks.
-fn block_t(bench: &Bench, less: &Fit, full: &Fit) -> f64 {
+#[must_use]
+pub fn block_t(bench: &Bench, less: &Fit, full: &Fit) -> f64 {
     let blocks = &bench.frame.blocks;
     let gains: Vec<f64> = blocks
         .windows(2)

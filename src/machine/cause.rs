@@ -139,6 +139,13 @@ vocabulary! {
     PreslidingFriction "presliding_friction" once "friction builds over a displacement after reversal" {
         /// Coulomb force ÷ bristle stiffness, at the load.
         displacement_um: "presliding_um", "presliding_um", "", TINY, HUGE;
+        /// How the stiffness falls on the way to the full level, as a power of what is left of it: 1 is the bristle of Dahl and LuGre.
+        exponent: "exponent", "exponent", "", 0.0, 4.0, = 1.0;
+        /// 1: not a bristle but elements that slip one after the other (Maxwell slip). The stiffness is then that of all of them
+        /// together; an exponent of ½ is that of elements that break away evenly spread.
+        maxwell_slip: "maxwell_slip", "maxwell_slip", "", 0.0, 1.0, = 0.0;
+        /// Damping of the bristle ÷ its stiffness (micro-damping of LuGre), s.
+        micro_damping_s: "micro_damping_s", "micro_damping_s", "", 0.0, 1.0, = 0.0;
     }
     /// Dead zone between motor and table.
     Backlash "backlash" once "dead zone between motor and table" {

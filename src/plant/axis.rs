@@ -67,14 +67,8 @@ impl Body {
     /// A body at a position and speed (motor's coordinate), its motor's current at `torque`.
     #[must_use]
     pub fn new(physics: Physics, step_s: f64, time_constant_s: f64, position: f64, velocity: f64, torque: f64) -> Body {
-        let stiffness = physics.bristle_stiffness().unwrap_or(0.0);
-        let mass = |inertia: f64, share: f64| Mass {
-            inertia,
-            share,
-            position,
-            velocity,
-            friction: Friction { stiffness: share * stiffness, force: 0.0 },
-        };
+        let mass =
+            |inertia: f64, share: f64| Mass { inertia, share, position, velocity, friction: physics.bristle(share) };
         let (motor, table) = match &physics.two_masses {
             None => (mass(physics.inertia, 1.0), mass(physics.inertia, 0.0)),
             Some(masses) => {

@@ -3,19 +3,56 @@
 //! Coulomb friction is not a function of speed: at rest it is whatever holds the axis, up to its level L. One implicit
 //! step of m·v′ = b − h·F, F ∈ L·Sign(v′), has one solution: v′ = soft(b, h·L)/m. It sticks exactly, at any step
 //! (Moreau, *Unilateral contact and dry friction*, 1988). With a bristle of stiffness σ, dF/dq = σ·(1 − sign(q̇)·F/L)
-//! (Dahl 1968; with a level that depends on speed: LuGre without micro-damping, Canudas de Wit et al. 1995), stepped
-//! implicitly as well.
+//! (Dahl 1968; with a level that depends on speed: LuGre, Canudas de Wit et al. 1995; its micro-damping adds τ·Ḟ), stepped
+//! implicitly as well. Or with elements that slip one after the other (generalized Maxwell slip, Lampaert et al. 2003).
+
+/// By what law friction builds up over a displacement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BristleLaw {
+    /// How the stiffness falls on the way to the level, see [`left_after`] and [`Elements`].
+    pub exponent: f64,
+    /// Whether it is that of [`Elements`], not of a bristle.
+    pub of_elements: bool,
+    /// Damping of the bristle over its stiffness, s.
+    pub micro_damping_s: f64,
+}
+
+impl Default for BristleLaw {
+    fn default() -> Self {
+        Self { exponent: 1.0, of_elements: false, micro_damping_s: 0.0 }
+    }
+}
 
 /// Dry friction of one body.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Friction {
     /// σ: torque per displacement of the bristle; zero for pure Coulomb friction.
     pub stiffness: f64,
-    /// Torque of the bristle now.
+    /// How the stiffness falls on the way to the level, see [`left_after`]; 1 is Dahl's bristle.
+    pub exponent: f64,
+    /// Damping of the bristle over its stiffness, s.
+    pub micro_damping_s: f64,
+    /// Torque of the bristle now, without its damping.
     pub force: f64,
+    /// In place of the bristle.
+    elements: Option<Elements>,
 }
 
 impl Friction {
+    /// A bristle at rest, or elements.
+    #[must_use]
+    pub fn new(stiffness: f64, law: BristleLaw) -> Self {
+        let BristleLaw { exponent, of_elements, micro_damping_s } = law;
+        let elements = of_elements.then(|| Elements::new(exponent));
+        Self { stiffness, exponent, micro_damping_s, force: 0.0, elements }
+    }
+
+    /// A bristle at rest; with a stiffness of zero pure Coulomb friction.
+    #[must_use]
+    pub fn bristle(stiffness: f64) -> Self {
+        Self::new(stiffness, BristleLaw::default())
+    }
+
     /// Speed after a step of `h` seconds, from the speed `v` before it.
     ///
     /// `mass`·v′ = `impulse` − h·F with |F| up to `level`; mass and impulse hold all else that acts.
@@ -30,22 +67,121 @@ impl Friction {
             self.force = 0.0;
             return impulse / mass;
         }
-        // F′ = (F + σ·h·v′)·L/d, with the bristle slipping at the speed before the step.
-        let d = level + self.stiffness * h * v.abs();
-        let next = (impulse * d - h * self.force * level) / (mass * d + self.stiffness * h * h * level);
+        if self.exponent != 1.0 || self.elements.is_some() {
+            let next;
+            (*self, next) = self.stepped(mass, impulse, h, level);
+            return next;
+        }
+        // F′ = (F + σ·h·v′)·L/d, with the bristle slipping at the speed before the step; its damping adds τ·(F′ − F)/h.
+        let (d, late) = (level + self.stiffness * h * v.abs(), h + self.micro_damping_s);
+        let impulse = impulse + self.micro_damping_s * self.force;
+        let next = (impulse * d - late * self.force * level) / (mass * d + self.stiffness * h * late * level);
         self.force = (self.force + self.stiffness * h * next) * level / d;
         next
+    }
+
+    /// The same of any exponent: the slope is that before the step, and the step is then taken exactly. By value, so that
+    /// those of pure Coulomb friction and of Dahl's bristle can stay in registers.
+    #[inline(never)]
+    fn stepped(mut self, mass: f64, impulse: f64, h: f64, level: f64) -> (Self, f64) {
+        let free = impulse - h * self.force;
+        let next = free / (mass + h * (h + self.micro_damping_s) * self.slope(free, level));
+        self.moved(h * next, level);
+        (self, next)
+    }
+
+    /// dF/dq towards the side that `towards` says.
+    fn slope(&self, towards: f64, level: f64) -> f64 {
+        if let Some(elements) = &self.elements {
+            return self.stiffness * elements.sticking(towards, level / self.stiffness);
+        }
+        let left = (1.0 - self.force * towards.signum() / level).clamp(0.0, 2.0);
+        self.stiffness * left.powf(self.exponent)
     }
 
     /// Torque after the bristle was moved by `dq`, at a given level, exactly.
     pub fn moved(&mut self, dq: f64, level: f64) -> f64 {
         if level <= 0.0 {
             self.force = 0.0;
+        } else if let Some(elements) = &mut self.elements {
+            self.force = self.stiffness * elements.moved(dq, level / self.stiffness);
         } else {
             let end = level.copysign(dq);
-            self.force = end + (self.force - end) * (-self.stiffness * dq.abs() / level).exp();
+            let left = left_after(0.5 - 0.5 * self.force / end, self.stiffness * dq.abs() / level, self.exponent);
+            self.force = end * (1.0 - 2.0 * left);
         }
         self.force
+    }
+
+    /// What its damping adds at speed `w`.
+    #[must_use]
+    pub fn damped(&self, w: f64, level: f64) -> f64 {
+        if self.micro_damping_s > 0.0 && level > 0.0 { self.micro_damping_s * w * self.slope(w, level) } else { 0.0 }
+    }
+}
+
+/// Share of the way between the levels that a bristle has left, after a displacement in units of level over stiffness:
+/// dF/dq = σ·(1 − F·sign(q̇)/L)ⁿ.
+#[inline]
+#[must_use]
+pub fn left_after(left: f64, by: f64, exponent: f64) -> f64 {
+    // Nothing of it is left but a rounding, as in most rows of a recording.
+    if left < 1e-14 {
+        return 0.0;
+    }
+    if exponent == 1.0 {
+        return left * (-by).exp();
+    }
+    let power = 1.0 - exponent;
+    let rest = left.powf(power) - power * by * 2f64.powf(-power);
+    if rest > 0.0 { rest.powf(1.0 / power) } else { 0.0 }
+}
+
+/// Elements side by side, each a spring that slips beyond its own displacement (generalized Maxwell slip): how far each is
+/// strained, and where it breaks away. Their stiffness together falls as the power n of the share of the level that is left:
+/// n = ½ where they break away evenly spread, 0 where all do at once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Elements {
+    strained: [f64; ELEMENTS],
+    /// In units of the mean.
+    break_away: [f64; ELEMENTS],
+}
+
+/// Elements: with more the law is no other.
+const ELEMENTS: usize = 8;
+
+impl Elements {
+    /// Elements at rest that break away so that the exponent comes about.
+    #[must_use]
+    pub fn new(exponent: f64) -> Self {
+        let n = exponent.clamp(1e-3, 0.999);
+        // With the share s of all stiffness left, the displacement is (1 − s^((1 − n)/n))/(1 − n).
+        let mut break_away = [0.0; ELEMENTS];
+        for (k, at) in break_away.iter_mut().enumerate() {
+            let left = 1.0 - (k as f64 + 0.5) / ELEMENTS as f64;
+            *at = 1.0 - left.powf((1.0 - n) / n);
+        }
+        let mean = break_away.iter().sum::<f64>() / ELEMENTS as f64;
+        Self { strained: [0.0; ELEMENTS], break_away: break_away.map(|at| at / mean) }
+    }
+
+    /// Mean strain after a displacement, with that mean of the displacements at which they break away.
+    #[inline]
+    pub fn moved(&mut self, by: f64, mean: f64) -> f64 {
+        let mut sum = 0.0;
+        for (strained, at) in self.strained.iter_mut().zip(&self.break_away) {
+            let (moved, end) = (*strained + by, at * mean);
+            let below = if moved < end { moved } else { end };
+            *strained = if below > -end { below } else { -end };
+            sum += *strained;
+        }
+        sum / ELEMENTS as f64
+    }
+
+    /// Share of the elements that do not slip when moved towards that side.
+    fn sticking(&self, towards: f64, mean: f64) -> f64 {
+        let stick = |(strained, at): (&f64, &f64)| strained * towards.signum() < at * mean;
+        self.strained.iter().zip(&self.break_away).filter(|pair| stick(*pair)).count() as f64 / ELEMENTS as f64
     }
 }
 
@@ -57,7 +193,7 @@ mod tests {
     #[test]
     fn coulomb_friction_stops_a_mass_where_energy_says() {
         for h in [1e-4, 1e-5] {
-            let (mut friction, mut x, mut v) = (Friction::default(), 0.0, 2.0_f64);
+            let (mut friction, mut x, mut v) = (Friction::bristle(0.0), 0.0, 2.0_f64);
             let mut steps = 0;
             while v != 0.0 && steps < 1_000_000 {
                 let next = friction.step(3.0, 3.0 * v, h, v, 5.0);
@@ -72,7 +208,7 @@ mod tests {
 
     #[test]
     fn it_holds_below_the_level_and_slips_above() {
-        let mut friction = Friction::default();
+        let mut friction = Friction::bristle(0.0);
         let h = 1e-4;
         assert_eq!(friction.step(1.0, h * 4.99, h, 0.0, 5.0), 0.0);
         assert!((friction.step(1.0, h * 5.5, h, 0.0, 5.0) - h * 0.5).abs() < 1e-15);
@@ -82,8 +218,8 @@ mod tests {
     #[test]
     fn the_bristle_follows_dahl() {
         let (h, level, stiffness) = (1e-6, 5.0, 400.0);
-        let mut dynamic = Friction { stiffness, force: 0.0 };
-        let mut exact = Friction { stiffness, force: 0.0 };
+        let mut dynamic = Friction::bristle(stiffness);
+        let mut exact = dynamic;
         // A heavy mass at nearly constant speed drags the bristle.
         let (mass, mut v, mut q) = (1e9, 0.05, 0.0);
         for step in 0..400_000 {
@@ -99,11 +235,53 @@ mod tests {
         assert!((dynamic.force - exact.force).abs() < 2e-3 * level);
     }
 
+    /// Elements from a reversal on follow the curve of their exponent (Masing's rule), and a small way back and forth leaves them
+    /// as they were.
+    #[test]
+    fn elements_follow_their_exponent_and_remember() {
+        for exponent in [0.2, 0.5, 0.7] {
+            let (level, stiffness) = (5.0, 400.0);
+            let law = BristleLaw { exponent, of_elements: true, micro_damping_s: 0.0 };
+            let mut friction = Friction::new(stiffness, law);
+            friction.moved(-1.0, level);
+            assert!((friction.force + level).abs() < 1e-12);
+            let (mut q, power) = (0.0, 1.0 - exponent);
+            for _ in 0..100 {
+                q += 0.0007;
+                let force = friction.moved(0.0007, level);
+                let left = (1.0 - power * 0.5 * stiffness * q / level).max(0.0).powf(1.0 / power);
+                assert!((force - level * (1.0 - 2.0 * left)).abs() < 0.04 * level, "{exponent}: {force} {left}");
+                friction.moved(-0.0003, level);
+                assert!((friction.moved(0.0003, level) - force).abs() < 1e-9 * level);
+            }
+        }
+    }
+
+    /// The step of forces and the law over a displacement are one, of any exponent.
+    #[test]
+    fn a_heavy_mass_drags_bristles_and_elements_along_their_curves() {
+        for (exponent, of_elements) in [(0.5, false), (1.5, false), (0.5, true)] {
+            let (h, level, mass) = (1e-5, 5.0, 1e9);
+            let mut dragged = Friction::new(400.0, BristleLaw { exponent, of_elements, micro_damping_s: 0.0 });
+            let mut exact = dragged;
+            let mut v = 0.5;
+            for step in 0..80_000 {
+                if step == 40_000 {
+                    v = -v;
+                }
+                v = dragged.step(mass, mass * v, h, v, level);
+                exact.moved(h * v, level);
+                assert!((dragged.force - exact.force).abs() < 1e-6 * level, "{exponent}");
+            }
+            assert!((dragged.force / -level - 1.0).abs() < 0.02, "{}", dragged.force);
+        }
+    }
+
     /// A body on a bristle never gains energy: dry friction only takes.
     #[test]
     fn friction_only_takes_energy() {
         for stiffness in [0.0, 400.0] {
-            let mut friction = Friction { stiffness, force: 0.0 };
+            let mut friction = Friction::bristle(stiffness);
             let (h, mass, mut v) = (1e-5, 0.5, 1.0);
             let mut most = 0.5 * mass * v * v;
             for _ in 0..200_000 {

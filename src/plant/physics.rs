@@ -6,6 +6,7 @@
 //! (J, ω, torques) are in the drive's own unit, x and v in load units (mm, mm/s; degrees on a rotary axis), t in s from
 //! the recording's first row.
 
+use super::friction::{BristleLaw, Friction};
 use crate::machine::{Axis, Effect, TwoMasses};
 use std::f64::consts::TAU;
 
@@ -56,6 +57,8 @@ pub struct Physics {
     pub two_masses: Option<TwoMasses>,
     /// Bristle displacement at full Coulomb friction in the motor's coordinate, where friction builds over a displacement.
     pub presliding: Option<f64>,
+    /// By what law.
+    bristle_law: BristleLaw,
     /// How late the torque column is, s.
     pub delay_s: f64,
     /// Torque ripple over the motor's position, in the order of the effects.
@@ -92,6 +95,7 @@ impl Physics {
             inertia: belief.inertia,
             two_masses: axis.two_masses()?,
             presliding: None,
+            bristle_law: BristleLaw::default(),
             delay_s: 0.0,
             cogging: Vec::new(),
             vibration: Vec::new(),
@@ -121,8 +125,9 @@ impl Physics {
                 | Effect::DriveCompliance { .. } => {}
                 Effect::DirectionDependentFriction { asymmetry } => p.asymmetry = asymmetry,
                 Effect::StribeckFriction { torque, velocity_mm_s } => p.stribeck = Some((torque, 1.0 / velocity_mm_s)),
-                Effect::PreslidingFriction { displacement_um } => {
+                Effect::PreslidingFriction { displacement_um, exponent, maxwell_slip, micro_damping_s } => {
                     p.presliding = Some(displacement_um * axis.drive.motor_per_um());
+                    p.bristle_law = BristleLaw { exponent, of_elements: maxwell_slip > 0.5, micro_damping_s };
                 }
                 Effect::Cogging { amplitude, period_mm } => p.cogging.push(ripple(amplitude, TAU / period_mm)),
                 Effect::PositionDependentFriction { centre_mm, peak, width_mm } => {
@@ -169,6 +174,12 @@ impl Physics {
         // Without Coulomb friction the level at rest stands for it.
         let level = if self.coulomb > 0.0 { self.coulomb } else { self.friction_level(0.0, 0.0, 0.0) };
         self.presliding.map(|displacement| level / displacement)
+    }
+
+    /// Dry friction of a body that has a share of it, at rest.
+    #[must_use]
+    pub fn bristle(&self, share: f64) -> Friction {
+        Friction::new(share * self.bristle_stiffness().unwrap_or(0.0), self.bristle_law)
     }
 
     /// Friction that grows with speed; `w` in the motor's coordinate.

@@ -98,12 +98,16 @@ fn needed_torque(physics: &Physics, observed: &Observed, run: Range<usize>, torq
         None => (physics.inertia, 1.0),
     };
     let level_at_rest = physics.friction_level(motion.position[run.start], 0.0, 0.0);
-    let stiffness = physics.bristle_stiffness().filter(|_| travel > smallest).unwrap_or(level_at_rest / travel);
-    let mut friction = Friction { stiffness: share * stiffness, force: 0.0 };
+    let mut friction = if physics.presliding.is_some_and(|travel| travel > smallest) {
+        physics.bristle(share)
+    } else {
+        Friction::bristle(share * level_at_rest / travel)
+    };
     let mut before = motion.position[run.start];
     for i in run.clone() {
         let (x, v, t) = (motion.position[i], motion.velocity[i], time[i] - time[0]);
-        let dry = friction.moved((x - before) * scale, share * physics.friction_level(x, v, t));
+        let level = share * physics.friction_level(x, v, t);
+        let dry = friction.moved((x - before) * scale, level) + friction.damped(v * scale, level);
         before = x;
         let table = match &transmitted {
             Some(table) => table[i - run.start],
@@ -134,7 +138,7 @@ fn measured_table_torque(
     let (scale, share) = (physics.motor_per_load, masses.table_friction_share);
     let travel = physics.presliding.unwrap_or(0.0).max(10.0 * motion.resolution * scale).max(1e-9 * scale);
     let level_at_rest = physics.friction_level(motion.position[0], 0.0, 0.0);
-    let mut friction = Friction { stiffness: share * level_at_rest / travel, force: 0.0 };
+    let mut friction = Friction::bristle(share * level_at_rest / travel);
     let mut before = motion.position[0];
     let torque = |i: usize| {
         let (x, v, t) = (motion.position[i], motion.velocity[i], observed.time_s[run.start + i] - observed.time_s[0]);
@@ -151,7 +155,7 @@ fn table_torque(physics: &Physics, masses: &TwoMasses, observed: &Observed, run:
     let scale = physics.motor_per_load;
     let motion = &observed.motion;
     let share = masses.table_friction_share;
-    let mut friction = Friction { stiffness: share * physics.bristle_stiffness().unwrap_or(0.0), force: 0.0 };
+    let mut friction = physics.bristle(share);
     let at = |i: usize| (motion.position[i] * scale, motion.velocity[i] * scale);
     let mut recoil = [0.0; 3];
     let (mut q, mut w) = at(run.start);

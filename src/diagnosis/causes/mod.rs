@@ -13,7 +13,6 @@ mod drive_compliance;
 mod external_vibration;
 mod inertia_mismatch;
 mod position_dependent_friction;
-mod presliding_friction;
 mod quadratic_drag;
 mod screw_periodic_error;
 mod screw_pitch_error;
@@ -23,6 +22,7 @@ mod torque_saturation;
 mod viscous_friction_mismatch;
 
 pub(super) mod periods;
+pub(super) mod presliding_friction;
 pub(super) mod table_side;
 
 use super::frame::Frame;
@@ -163,7 +163,7 @@ fn one_start(_: &Frame, _: &Rest) -> Vec<Vec<f64>> {
 }
 
 /// `count` values from low to high, equal ratios.
-fn log_spaced(low: f64, high: f64, count: usize) -> impl Iterator<Item = f64> {
+fn log_spaced(low: f64, high: f64, count: usize) -> impl Iterator<Item = f64> + Clone {
     let ratio = (high / low).powf(1.0 / (count.max(2) - 1) as f64);
     (0..count).map(move |i| low * ratio.powi(i as i32))
 }

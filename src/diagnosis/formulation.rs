@@ -1,0 +1,83 @@
+//! How friction builds up after a reversal is formulated in more than one way: by a bristle (Dahl, LuGre), by a bristle of another
+//! exponent, which goes on stiff and slips late (elasto-plastic), by elements that slip one after the other (Maxwell slip). What a
+//! displacement is worth depends on it. The search knows one bristle and one spread of elements; here the exponents are refined, and
+//! another formulation than the plain bristle is taken where it is known to be better.
+
+use super::causes::presliding_friction::{BRISTLE, ELEMENTS, OF_ANY_EXPONENT};
+use super::causes::{Law, law};
+use super::fit::{Bench, Fit};
+use super::progress::{Stopped, Watch};
+use super::select::{LEAST_STRENGTH, Selection, is_physical, price, shrink};
+use super::uncertainty;
+use super::verdict::block_t;
+use crate::machine::{Cause, Effect};
+
+/// Most steps of a fit by itself, and with all the others.
+const OWN_STEPS: usize = 5;
+const STEPS: usize = 8;
+/// Squares over the least up to which a fit by itself is refined with the others.
+const WITHIN_REACH: f64 = 1.3;
+/// Below this mean over scatter of what one fit gains over another in each block they are alike.
+const ALIKE: f64 = 2.0;
+
+/// The selection with friction that builds up by the law that it follows, and without what only stood in for that.
+///
+/// # Errors
+/// [`Stopped`] when the watch's caller said so.
+pub fn settled(bench: &Bench, found: Selection, watch: &Watch) -> Result<Selection, Stopped> {
+    let Some(at) = found.fit.parts.iter().position(|part| part.law.cause == Cause::PreslidingFriction) else {
+        return Ok(found);
+    };
+    // What is tried is refined by itself first: that is enough to see whether it is worth more.
+    let mut parts = found.fit.parts.clone();
+    let sought = parts.remove(at);
+    let (last, stiffness) = (parts.len(), sought.shape[0]);
+    let with = |law: &'static Law, kind: [f64; 2]| {
+        let shape = vec![stiffness, kind[0], kind[1]];
+        let own = bench.parts(law, vec![shape]);
+        bench.refine_roughly(bench.fit(parts.iter().cloned().chain(own).collect()), last, OWN_STEPS)
+    };
+    let is_plain = sought.shape[1..] == BRISTLE;
+    let plain = if is_plain { found.fit.clone() } else { with(law(Cause::PreslidingFriction), BRISTLE) };
+    let mut others = [BRISTLE, ELEMENTS].map(|kind| with(&OF_ANY_EXPONENT, kind));
+    others.sort_by(|a, b| a.squares().total_cmp(&b.squares()));
+    let [best, other] = others;
+    if price(&best) < price(&plain) && is_another(bench, &best, last) {
+        let alike = other.squares() <= WITHIN_REACH * best.squares();
+        let refined = |fit: Fit| Some(bench.refine(fit, 0, STEPS)).filter(|fit| is_physical(bench, fit));
+        let mut fits: Vec<Fit> = std::iter::once(best).chain(alike.then_some(other)).filter_map(refined).collect();
+        fits.sort_by(|a, b| a.squares().total_cmp(&b.squares()));
+        if fits.first().is_some_and(|fit| price(fit) < price(&plain) && is_another(bench, fit, last)) {
+            let fit = fits.remove(0);
+            fits.retain(|other| block_t(bench, other, &fit) < ALIKE);
+            return without_substitutes(bench, Selection { fit, alike: fits, ..found }, watch);
+        }
+    }
+    let fit = if is_plain { plain } else { bench.refine(plain, 0, STEPS) };
+    Ok(if is_physical(bench, &fit) { Selection { fit, ..found } } else { found })
+}
+
+/// The selection without causes that only stood in for what the law did not have.
+fn without_substitutes(bench: &Bench, found: Selection, watch: &Watch) -> Result<Selection, Stopped> {
+    if found.fit.parts.len() == 1 {
+        return Ok(found);
+    }
+    let fit = shrink(bench, found.fit, watch)?;
+    let left: Vec<Cause> = fit.parts.iter().map(|part| part.law.cause).collect();
+    let of_the_same = |other: Fit| {
+        let parts = other.parts.into_iter().filter(|part| left.contains(&part.law.cause)).collect::<Vec<_>>();
+        (parts.len() == left.len()).then(|| bench.fit(parts))
+    };
+    let alike = found.alike.into_iter().filter_map(of_the_same).collect();
+    Ok(Selection { fit, alike, rivals: found.rivals })
+}
+
+/// Whether the exponent is surely not that of the plain bristle. Elements of this exponent go the same way after a full reversal.
+fn is_another(bench: &Bench, fit: &Fit, at: usize) -> bool {
+    match uncertainty::effects(bench, fit).swap_remove(at) {
+        Some((Effect::PreslidingFriction { exponent, .. }, deviations)) => {
+            (exponent - BRISTLE[0]).abs() > LEAST_STRENGTH * deviations[1]
+        }
+        _ => false,
+    }
+}
