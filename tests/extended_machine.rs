@@ -64,6 +64,44 @@ fn a_delay_is_found_at_every_phase_of_the_cycle() {
     }
 }
 
+/// Nobody knows beforehand how friction goes near standstill, or how a stretch of guideway begins and ends: another form is found
+/// with its number, and the usual one is neither fitted nor said.
+#[test]
+fn friction_of_another_form_is_found_and_the_usual_one_taken() {
+    let low_speed = |exponent| Effect::StribeckFriction { torque: 0.4, velocity_mm_s: 8.0, exponent };
+    let place = |centre_mm, width_mm, steepness| Effect::PositionDependentFriction {
+        centre_mm,
+        peak: 0.4,
+        width_mm,
+        steepness,
+    };
+    let lasting = place(220.0, 90.0, 30.0);
+    for truth in
+        [low_speed(0.7), low_speed(1.0), low_speed(2.0), place(110.0, 25.0, 2.0), place(110.0, 25.0, 12.0), lasting]
+    {
+        let d = judged(&rig(&[]), &recorded(&rig(&[truth]), &test_moves(), 17));
+        assert_eq!((named(&d), d.verdict), (vec![truth.cause()], Verdict::Explained), "{truth:?}");
+        let finding = &d.findings[0];
+        let form = truth.values().len() - 1;
+        let (of_form, found) = (truth.values()[form], finding.effect.values()[form]);
+        let is_usual = of_form == 2.0;
+        assert_eq!(finding.parameters(false).count(), truth.values().len() - usize::from(is_usual), "{finding:?}");
+        assert!(!is_usual || found == 2.0, "{finding:?}");
+        let numbers = finding.effect.values().into_iter().zip(truth.values()).zip(&finding.deviations);
+        for ((found, true_value), deviation) in numbers.filter(|_| truth != lasting) {
+            let off = found - true_value;
+            assert!(off.abs() <= (3.5 * deviation).min(0.15 * true_value), "{truth:?}: {found} ± {deviation}");
+        }
+        // Of what lasts to the end of the stroke there is only where it begins, and over what way.
+        if let (true, Effect::PositionDependentFriction { centre_mm, width_mm, steepness, .. }) =
+            (truth == lasting, finding.effect)
+        {
+            let way = width_mm / steepness;
+            assert!((centre_mm - width_mm - 130.0).abs() < 1.0 && (way - 3.0).abs() < 0.3, "{finding:?}");
+        }
+    }
+}
+
 /// Without a servo block nobody knows how the torque is sampled: so much is moved and said, and names no cause, nor spoils the
 /// numbers of those that are there. More than that is a dead time all the same.
 #[test]
@@ -91,7 +129,7 @@ fn half_a_row_of_an_unknown_servo_is_no_dead_time() {
 fn what_was_found_and_simulated_again_is_no_discrepancy() {
     let several = vec![
         Effect::CoulombFrictionMismatch { torque: 1.1 },
-        Effect::StribeckFriction { torque: 0.4, velocity_mm_s: 8.0 },
+        Effect::StribeckFriction { torque: 0.4, velocity_mm_s: 8.0, exponent: 2.0 },
         Effect::Cogging { amplitude: 0.15, period_mm: 2.5 },
     ];
     let clearance =
@@ -158,7 +196,7 @@ fn the_proposed_experiment_tells_the_two_apart() {
         ],
         [
             Effect::CableForce { slope: 0.004, zero_mm: 100.0 },
-            Effect::PositionDependentFriction { centre_mm: 90.0, peak: 0.5, width_mm: 25.0 },
+            Effect::PositionDependentFriction { centre_mm: 90.0, peak: 0.5, width_mm: 25.0, steepness: 2.0 },
         ],
         [Effect::ViscousFrictionMismatch { slope: 0.014 }, Effect::QuadraticDrag { drag: 8.0 }],
     ];

@@ -137,7 +137,7 @@ fn the_plant_converges_with_its_step() {
     let effects = [
         Effect::Backlash { width_um: 20.0, table_inertia_share: 0.4, table_friction_share: 0.6, contact_hz: 400.0 },
         Effect::PreslidingFriction { displacement_um: 8.0, exponent: 1.0, maxwell_slip: 0.0, micro_damping_s: 0.0 },
-        Effect::StribeckFriction { torque: 0.3, velocity_mm_s: 4.0 },
+        Effect::StribeckFriction { torque: 0.3, velocity_mm_s: 4.0, exponent: 2.0 },
     ];
     for effects in [&effects[..0], &effects[1..], &effects[..]] {
         let at = |step_s| run(&rig(effects), "reversals", &Setup { step_s, ..Setup::default() }).position;
@@ -200,7 +200,7 @@ fn every_cause_of_torque_is_predicted() {
         Effect::ViscousFrictionMismatch { slope: 0.014 },
         Effect::ConstantTorque { torque: 0.4 },
         Effect::DirectionDependentFriction { asymmetry: 0.003 },
-        Effect::StribeckFriction { torque: 0.6, velocity_mm_s: 20.0 },
+        Effect::StribeckFriction { torque: 0.6, velocity_mm_s: 20.0, exponent: 2.0 },
         Effect::PreslidingFriction { displacement_um: 400.0, exponent: 1.0, maxwell_slip: 0.0, micro_damping_s: 0.0 },
         Effect::DriveCompliance {
             resonance_hz: 32.0,
@@ -210,7 +210,7 @@ fn every_cause_of_torque_is_predicted() {
             damping_ratio: 0.05,
         },
         Effect::Cogging { amplitude: 0.15, period_mm: 2.5 },
-        Effect::PositionDependentFriction { centre_mm: 110.0, peak: 0.5, width_mm: 25.0 },
+        Effect::PositionDependentFriction { centre_mm: 110.0, peak: 0.5, width_mm: 25.0, steepness: 2.0 },
         Effect::CableForce { slope: 0.004, zero_mm: 100.0 },
         Effect::QuadraticDrag { drag: 8.0 },
         Effect::ThermalDrift { drop: 0.4, time_constant_s: 25.0 },

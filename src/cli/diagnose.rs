@@ -127,15 +127,9 @@ fn text(d: &Diagnosis) -> String {
             100.0 * finding.confidence
         );
         let _ = writeln!(text, "   {}", finding.evidence);
-        // What is left out of a file where it has this value may be left out here.
-        let defaults = finding.effect.cause().row().parameters.iter().map(|parameter| parameter.default);
         let parameters: Vec<String> = finding
-            .effect
-            .keyed_values(d.extended.drive.is_linear())
-            .zip(&finding.deviations)
-            .zip(defaults)
-            .filter(|(((_, value), _), default)| Some(*value) != *default)
-            .map(|(((key, value), std), _)| format!("{key} {}", with_interval(value, 1.96 * std)))
+            .parameters(d.extended.drive.is_linear())
+            .map(|(key, value, std)| format!("{key} {}", with_interval(value, 1.96 * std)))
             .collect();
         let _ = writeln!(text, "   {}", parameters.join(", "));
         for other in &finding.indistinguishable_from {

@@ -193,7 +193,7 @@ mod tests {
         let axis = Axis { effects: Vec::new(), ..axis() };
         let mut found = [
             Effect::CoulombFrictionMismatch { torque: 0.9 },
-            Effect::StribeckFriction { torque: 0.3, velocity_mm_s: 5.0 },
+            Effect::StribeckFriction { torque: 0.3, velocity_mm_s: 5.0, exponent: 2.0 },
             presliding(66.0),
         ];
         reconcile(&axis, found.iter_mut());

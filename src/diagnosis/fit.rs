@@ -221,8 +221,7 @@ impl<'f, 'a> Bench<'f, 'a> {
             if slopes.is_empty() {
                 break;
             }
-            let columns: Vec<&[f64]> = slopes.iter().map(|s| s.column.as_slice()).collect();
-            let steps = project(&columns, &fit.basis, &fit.residual);
+            let steps = self.steps(&fit, &slopes);
             let before = fit.squares();
             let mut share = 1.0;
             let mut better = None;
@@ -293,6 +292,14 @@ impl<'f, 'a> Bench<'f, 'a> {
     }
 }
 
+impl Part {
+    /// Number of its non-linear parameters that are fitted.
+    #[must_use]
+    pub fn free_parameters(&self) -> usize {
+        self.shape.iter().enumerate().filter(|(i, value)| !self.law.is_as_usual(*i, **value)).count()
+    }
+}
+
 impl Fit {
     /// Weighted sum of squares.
     #[must_use]
@@ -327,7 +334,7 @@ impl Fit {
     /// Number of fitted numbers.
     #[must_use]
     pub fn numbers(&self) -> usize {
-        self.parts.iter().map(|p| p.columns.len() + p.shape.len()).sum()
+        self.parts.iter().map(|p| p.columns.len() + p.free_parameters()).sum()
     }
 
     /// Orthonormal columns of the fit, free ones first.
@@ -419,21 +426,26 @@ pub(super) fn orthonormal(column: &[f64], basis: &[Vec<f64>]) -> (Vec<f64>, Vec<
     (c, weights)
 }
 
-/// Least-squares coefficients of columns on what a basis leaves of them.
-fn project(columns: &[&[f64]], basis: &[Vec<f64>], target: &[f64]) -> Vec<f64> {
+/// What a basis leaves of columns, as R of their decomposition, and a target along its directions.
+fn projected(columns: &[&[f64]], basis: &[Vec<f64>], target: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
     let mut all = basis.to_vec();
-    let mut triangle = Vec::new();
-    for column in columns {
+    let mut triangle = DMatrix::zeros(columns.len(), columns.len());
+    for (j, column) in columns.iter().enumerate() {
         let (direction, weights) = orthonormal(column, &all);
         all.push(direction);
-        triangle.push(weights);
+        weights.iter().skip(basis.len()).enumerate().for_each(|(i, weight)| triangle[(i, j)] = *weight);
     }
-    let along: Vec<f64> = all.iter().skip(basis.len()).map(|d| dot(d, target)).collect();
+    let along = all.iter().skip(basis.len()).map(|direction| dot(direction, target));
+    (triangle, DVector::from_iterator(columns.len(), along))
+}
+
+/// Least-squares coefficients of columns on what a basis leaves of them; 0 of a column of which nothing is left.
+fn project(columns: &[&[f64]], basis: &[Vec<f64>], target: &[f64]) -> Vec<f64> {
+    let (triangle, along) = projected(columns, basis, target);
     let mut solution = vec![0.0; columns.len()];
     for i in (0..columns.len()).rev() {
-        let above: f64 = (i + 1..columns.len()).map(|j| triangle[j][basis.len() + i] * solution[j]).sum();
-        let diagonal = triangle[i][basis.len() + i];
-        solution[i] = if diagonal > 0.0 { (along[i] - above) / diagonal } else { 0.0 };
+        let above: f64 = (i + 1..columns.len()).map(|j| triangle[(i, j)] * solution[j]).sum();
+        solution[i] = if triangle[(i, i)] > 0.0 { (along[i] - above) / triangle[(i, i)] } else { 0.0 };
     }
     solution
 }

@@ -315,6 +315,13 @@ impl<'a> Frame<'a> {
         self.judged(&friction)
     }
 
+    /// [`Frame::fading`] with a power of a distance.
+    #[must_use]
+    pub fn fading_by(&self, column: &[f64], exponent: f64, distance: impl Fn(f64) -> f64) -> Vec<f64> {
+        let (square, half) = (|value| distance(value).powi(2), 0.5 * exponent);
+        if half == 1.0 { self.fading(column, square) } else { self.fading(column, |value| square(value).powf(half)) }
+    }
+
     /// The measured torque at the judged rows, if the column is late by `late_s` beyond what is known. What a delay has
     /// flattened is raised again.
     #[must_use]

@@ -27,12 +27,9 @@ impl Diagnosis {
             .findings
             .iter()
             .map(|f| {
-                let parameters: Map<String, Value> = f
-                    .effect
-                    .keyed_values(linear)
-                    .zip(&f.deviations)
-                    .map(|((key, value), std)| (key.to_owned(), json!({ "value": value, "std": std })))
-                    .collect();
+                let parameter =
+                    |(key, value, std): (&str, _, _)| (key.to_owned(), json!({ "value": value, "std": std }));
+                let parameters: Map<String, Value> = f.parameters(linear).map(parameter).collect();
                 let ties: Vec<&str> = f.indistinguishable_from.iter().map(|c| c.name()).collect();
                 json!({ "cause": f.effect.cause().name(), "confidence": f.confidence, "share": f.share,
                     "parameters": parameters, "evidence": f.evidence, "indistinguishable_from": ties,

@@ -77,14 +77,14 @@ fn by_its_law(frame: &Frame, effect: &Effect) -> Option<(Vec<f64>, Vec<f64>)> {
     let peak = || frame.columns.torque.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
     Some(match *effect {
         DirectionDependentFriction { asymmetry } => (vec![], vec![asymmetry]),
-        StribeckFriction { torque, velocity_mm_s } => (vec![velocity_mm_s], vec![torque]),
+        StribeckFriction { torque, velocity_mm_s, exponent } => (vec![velocity_mm_s, exponent], vec![torque]),
         PreslidingFriction { displacement_um, exponent, maxwell_slip, micro_damping_s } => (
             vec![displacement_um, exponent, maxwell_slip],
             vec![frame.belief.coulomb, frame.belief.coulomb * micro_damping_s],
         ),
         Cogging { amplitude, period_mm } => (vec![stroke / period_mm], vec![amplitude]),
-        PositionDependentFriction { centre_mm, peak, width_mm } => {
-            (vec![(centre_mm - low) / stroke, width_mm / stroke], vec![peak])
+        PositionDependentFriction { centre_mm, peak, width_mm, steepness } => {
+            (vec![(centre_mm - low) / stroke, width_mm / stroke, steepness], vec![peak])
         }
         CableForce { slope, zero_mm } => (vec![1.0], vec![slope, -slope * zero_mm]),
         QuadraticDrag { drag } => (vec![], vec![drag]),

@@ -18,6 +18,7 @@ pub mod experiment;
 pub mod filter;
 pub mod fit;
 mod foreign;
+mod form;
 mod formulation;
 pub mod frame;
 pub mod gain;

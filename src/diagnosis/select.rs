@@ -10,6 +10,7 @@ use super::blocks;
 use super::causes::Law;
 use super::causes::periods::{FEW, is_all_the_time, is_in_each_period};
 use super::fit::{Bench, Fit, Part, figure};
+use super::form;
 use super::grids;
 use super::many::add;
 use super::progress::{Stopped, Watch};
@@ -242,7 +243,8 @@ fn refined(bench: &Bench, set: &Fit, part: Part) -> Fit {
     parts.push(part);
     let count = set.parts.len();
     let fit = bench.refine_roughly(bench.fit(parts), count, 6);
-    bench.refine_roughly(fit, 0, if count == 0 { 4 } else { 2 })
+    let fit = bench.refine_roughly(fit, 0, if count == 0 { 4 } else { 2 });
+    form::settled(bench, fit, count..count + 1, 6)
 }
 
 /// What a set with a cause more becomes that was fitted beyond physical bounds: without those of before that the new one has made
@@ -279,7 +281,7 @@ fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Vec<C
     } else {
         shelved()
     };
-    let figure_with = |part: &Part| figure(&bench.joined(set, part)) + NUMBER_PRICE * part.shape.len() as f64;
+    let figure_with = |part: &Part| figure(&bench.joined(set, part)) + NUMBER_PRICE * part.free_parameters() as f64;
     let best = |few: bool| {
         let alike = parts.iter().filter(|part| few_periods(part) == few);
         let (figure, part) = alike.map(|part| (figure_with(part), part)).min_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -311,7 +313,9 @@ pub fn is_physical(bench: &Bench, fit: &Fit) -> bool {
     one_of_each && (0..fit.parts.len()).all(|i| is_within_bounds(bench, fit, i))
 }
 
-fn is_within_bounds(bench: &Bench, fit: &Fit, part: usize) -> bool {
+/// Whether a part does.
+#[must_use]
+pub fn is_within_bounds(bench: &Bench, fit: &Fit, part: usize) -> bool {
     let Part { law, shape, .. } = &fit.parts[part];
     (law.effect)(bench.frame, shape, &fit.coefficients[part]).is_some()
 }
@@ -342,6 +346,8 @@ pub fn idle_left_out(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, 
 /// [`Stopped`] when the watch's caller said so.
 pub fn shrink(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
     fit = bench.refine(fit, 0, 8);
+    let all = 0..fit.parts.len();
+    fit = form::settled(bench, fit, all, 8);
     while !fit.parts.is_empty() {
         let each: Vec<usize> = (0..fit.parts.len()).collect();
         let mut without = watch.each(&each, (0.8, 0.9), "leaving out what is not needed", |&i| {

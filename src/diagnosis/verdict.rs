@@ -55,6 +55,16 @@ pub struct Finding {
     pub next_experiment: Option<(serde_json::Value, String)>,
 }
 
+impl Finding {
+    /// Key, value and standard deviation of each parameter that was found; what a law has as usual was not.
+    pub fn parameters(&self, linear: bool) -> impl Iterator<Item = (&'static str, f64, f64)> {
+        let usual = self.effect.cause().row().parameters.iter().map(|parameter| parameter.default);
+        let found = self.effect.keyed_values(linear).zip(&self.deviations).zip(usual);
+        let found = found.filter(|(((_, value), std), usual)| **std > 0.0 || Some(*value) != *usual);
+        found.map(|(((key, value), std), _)| (key, value, *std))
+    }
+}
+
 /// What is left of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Left {

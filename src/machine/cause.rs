@@ -134,6 +134,8 @@ vocabulary! {
         torque: "stribeck_torque_nm", "stribeck_torque_n", "stribeck_force_n", -HUGE, HUGE;
         /// vs at the load.
         velocity_mm_s: "stribeck_velocity_mm_s", "stribeck_velocity_mm_s", "", TINY, HUGE;
+        /// n: Gaussian with 2, exponential with 1.
+        exponent: "stribeck_exponent", "stribeck_exponent", "", 0.1, 20.0, = 2.0;
     }
     /// Friction builds over a displacement after a reversal (Dahl, LuGre).
     PreslidingFriction "presliding_friction" once "friction builds over a displacement after reversal" {
@@ -180,7 +182,7 @@ vocabulary! {
         /// At the load.
         period_mm: "period_mm", "period_mm", "", TINY, HUGE;
     }
-    /// peak·exp(−((x − centre)/width)²)·sign(v).
+    /// peak·exp(−|(x − centre)/width|ⁿ)·sign(v): n = 2 is a bell, a larger one a stretch with steep ends.
     PositionDependentFriction "position_dependent_friction" many "a tight spot or a change of friction along the stroke" {
         /// Where the spot is.
         centre_mm: "centre_mm", "centre_mm", "", -HUGE, HUGE;
@@ -188,6 +190,8 @@ vocabulary! {
         peak: "peak_nm", "peak_n", "", -HUGE, HUGE;
         /// Distance from the centre at which 1/e of the peak is left.
         width_mm: "width_mm", "width_mm", "", TINY, HUGE, = 20.0;
+        /// n, how steeply the friction changes at the ends.
+        steepness: "steepness", "steepness", "", 0.5, 200.0, = 2.0;
     }
     /// slope·(x − zero).
     CableForce "cable_force" once "force proportional to position" {
@@ -339,6 +343,9 @@ mod tests {
             assert!(Effect::from_values(row.cause, &[]).is_none(), "every cause has a required parameter");
         }
         let spot = Effect::from_values(Cause::PositionDependentFriction, &[1.0, 2.0]).unwrap();
-        assert_eq!(spot, Effect::PositionDependentFriction { centre_mm: 1.0, peak: 2.0, width_mm: 20.0 });
+        assert_eq!(
+            spot,
+            Effect::PositionDependentFriction { centre_mm: 1.0, peak: 2.0, width_mm: 20.0, steepness: 2.0 }
+        );
     }
 }

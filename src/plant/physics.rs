@@ -38,6 +38,39 @@ struct Spot {
     centre: f64,
     peak: f64,
     per_width: f64,
+    /// Half of the exponent of the distance.
+    half_steepness: f64,
+}
+
+impl Spot {
+    /// Friction more at a position.
+    #[inline]
+    fn friction(&self, x: f64) -> f64 {
+        self.peak * fading(power(((x - self.centre) * self.per_width).powi(2), self.half_steepness))
+    }
+}
+
+/// Friction that differs at low speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Stribeck {
+    torque: f64,
+    per_velocity: f64,
+    /// Half of the exponent of the speed.
+    half_exponent: f64,
+}
+
+impl Stribeck {
+    /// Friction more at a speed.
+    #[inline]
+    fn friction(&self, v: f64) -> f64 {
+        self.torque * fading(power((v * self.per_velocity).powi(2), self.half_exponent))
+    }
+}
+
+/// A power, which is dear, of a number that most often is to stay as it is.
+#[inline]
+fn power(x: f64, exponent: f64) -> f64 {
+    if exponent == 1.0 { x } else { x.powf(exponent) }
 }
 
 /// e^−x. Beyond this the exponential is less than a rounding of what it is added to, and it is dear.
@@ -75,7 +108,7 @@ pub struct Physics {
     viscous: f64,
     asymmetry: f64,
     constant: f64,
-    stribeck: Option<(f64, f64)>,
+    stribeck: Option<Stribeck>,
     spots: Vec<Spot>,
     drift: Option<(f64, f64)>,
     cable: Option<(f64, f64)>,
@@ -124,14 +157,18 @@ impl Physics {
                 | Effect::Backlash { .. }
                 | Effect::DriveCompliance { .. } => {}
                 Effect::DirectionDependentFriction { asymmetry } => p.asymmetry = asymmetry,
-                Effect::StribeckFriction { torque, velocity_mm_s } => p.stribeck = Some((torque, 1.0 / velocity_mm_s)),
+                Effect::StribeckFriction { torque, velocity_mm_s, exponent } => {
+                    let (per_velocity, half_exponent) = (1.0 / velocity_mm_s, 0.5 * exponent);
+                    p.stribeck = Some(Stribeck { torque, per_velocity, half_exponent });
+                }
                 Effect::PreslidingFriction { displacement_um, exponent, maxwell_slip, micro_damping_s } => {
                     p.presliding = Some(displacement_um * axis.drive.motor_per_um());
                     p.bristle_law = BristleLaw { exponent, of_elements: maxwell_slip > 0.5, micro_damping_s };
                 }
                 Effect::Cogging { amplitude, period_mm } => p.cogging.push(ripple(amplitude, TAU / period_mm)),
-                Effect::PositionDependentFriction { centre_mm, peak, width_mm } => {
-                    p.spots.push(Spot { centre: centre_mm, peak, per_width: 1.0 / width_mm });
+                Effect::PositionDependentFriction { centre_mm, peak, width_mm, steepness } => {
+                    let (per_width, half_steepness) = (1.0 / width_mm, 0.5 * steepness);
+                    p.spots.push(Spot { centre: centre_mm, peak, per_width, half_steepness });
                 }
                 Effect::CableForce { slope, zero_mm } => p.cable = Some((slope, zero_mm)),
                 // v in m/s is 1e-3 of v in mm/s.
@@ -156,11 +193,11 @@ impl Physics {
     #[inline]
     pub fn friction_level(&self, x: f64, v: f64, t: f64) -> f64 {
         let mut level = self.coulomb;
-        if let Some((torque, per_velocity)) = self.stribeck {
-            level += torque * fading((v * per_velocity).powi(2));
+        if let Some(stribeck) = &self.stribeck {
+            level += stribeck.friction(v);
         }
         for spot in &self.spots {
-            level += spot.peak * fading(((x - spot.centre) * spot.per_width).powi(2));
+            level += spot.friction(x);
         }
         if let Some((drop, per_time)) = self.drift {
             level += drop * fading(t * per_time);

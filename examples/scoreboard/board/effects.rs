@@ -102,7 +102,9 @@ impl Effect {
             }
             "direction_dependent_friction" => (0.05 * rig.viscous, 0.6 * rig.viscous, 1.0),
             "stribeck_friction" => {
-                form[0] = rig.reach.speed * r.log_uniform(0.005, 0.06);
+                // In one of three the exponent that a tribometer would have found.
+                let exponent = if r.chance(0.3) { r.uniform(0.6, 1.4) } else { 2.0 };
+                form = [rig.reach.speed * r.log_uniform(0.005, 0.06), exponent, 0.0];
                 (0.1 * tc, 0.6 * tc, 1.0)
             }
             "presliding_friction" => {
@@ -138,7 +140,13 @@ impl Effect {
             }
             "position_dependent_friction" => {
                 sign = if r.chance(0.85) { 1.0 } else { -1.0 };
-                form = [rig.reach.low + stroke * r.uniform(0.15, 0.85), stroke * r.log_uniform(0.04, 0.15), 0.0];
+                form = [rig.reach.low + stroke * r.uniform(0.15, 0.85), stroke * r.log_uniform(0.04, 0.15), 2.0];
+                if r.chance(0.25) {
+                    form[2] = r.log_uniform(2.5, 20.0);
+                } else if r.chance(0.2) {
+                    // A guideway that is another from somewhere on.
+                    form = [rig.reach.high, stroke * r.uniform(0.3, 0.7), r.log_uniform(8.0, 40.0)];
+                }
                 (0.1 * tc, if sign > 0.0 { 1.5 } else { 0.7 } * tc, 1.0)
             }
             "cable_force" => {
@@ -216,14 +224,14 @@ impl Effect {
             "constant_torque" if form[0] > 0.0 => truth.coulomb_by_direction = size,
             "constant_torque" => truth.constant += size,
             "direction_dependent_friction" => truth.asymmetry = size,
-            "stribeck_friction" => truth.stribeck = (size, form[0]),
+            "stribeck_friction" => truth.stribeck = (size, form[0], form[1]),
             "presliding_friction" => {
                 truth.presliding = self.amount / rig.unit;
                 truth.bristle_damping = form[0];
             }
             "backlash" | "drive_compliance" => truth.coupling = Some(self.coupling(rig)),
             "cogging" => truth.cogging = Sine { amplitude: self.amount, period: form[0], phase: form[1] },
-            "position_dependent_friction" => truth.spot = (form[0], size, form[1]),
+            "position_dependent_friction" => truth.spot = (form[0], size, form[1], form[2]),
             "cable_force" => truth.cable = (size, form[0]),
             "quadratic_drag" => truth.drag = size,
             "thermal_drift" => truth.drift = (size, form[0]),
@@ -254,7 +262,11 @@ impl Effect {
                 vec![Parameter { scale: size.abs(), ..scored("constant_torque_nm", rig.constant + size) }]
             }
             "direction_dependent_friction" => vec![scored("asymmetry_nm_s", size)],
-            "stribeck_friction" => vec![scored("stribeck_torque_nm", size), scored("stribeck_velocity_mm_s", form[0])],
+            "stribeck_friction" => vec![
+                scored("stribeck_torque_nm", size),
+                scored("stribeck_velocity_mm_s", form[0]),
+                extra("stribeck_exponent", form[1]),
+            ],
             "presliding_friction" => vec![scored("presliding_um", self.amount * 1e3)],
             "backlash" => vec![
                 scored("backlash_um", self.amount * 1e3),
@@ -275,9 +287,11 @@ impl Effect {
             }
             "cogging" => vec![scored("amplitude_nm", self.amount), scored("period_mm", form[0])],
             "position_dependent_friction" => vec![
-                Parameter { scale: 0.1 * stroke, ..scored("centre_mm", form[0]) },
+                // Where the middle of what lasts to the end of the stroke lies is nowhere to be seen.
+                Parameter { scale: 0.1 * stroke, scored: form[0] < rig.reach.high, ..scored("centre_mm", form[0]) },
                 scored("peak_nm", size),
                 extra("width_mm", form[1]),
+                extra("steepness", form[2]),
             ],
             "cable_force" => vec![scored("slope_nm_mm", size), extra("zero_mm", form[0])],
             "quadratic_drag" => vec![scored("drag_nm_s2_m2", size)],
@@ -329,11 +343,13 @@ mod tests {
             "constant_torque" => value("constant_torque_nm") - rig.constant,
             "direction_dependent_friction" => value("asymmetry_nm_s") * w.abs(),
             "stribeck_friction" => {
-                way * value("stribeck_torque_nm") * (-(v / value("stribeck_velocity_mm_s")).powi(2)).exp()
+                way * value("stribeck_torque_nm")
+                    * (-(v / value("stribeck_velocity_mm_s")).abs().powf(value("stribeck_exponent"))).exp()
             }
             "cogging" => value("amplitude_nm") * (TAU * x / value("period_mm") + effect.form[1]).sin(),
             "position_dependent_friction" => {
-                way * value("peak_nm") * (-((x - value("centre_mm")) / value("width_mm")).powi(2)).exp()
+                way * value("peak_nm")
+                    * (-((x - value("centre_mm")) / value("width_mm")).abs().powf(value("steepness"))).exp()
             }
             "cable_force" => value("slope_nm_mm") * (x - value("zero_mm")),
             "quadratic_drag" => value("drag_nm_s2_m2") * v * v.abs() * 1e-6,

@@ -4,7 +4,7 @@
 //!
 //! τ = J·α + Tv·ω + A·|ω| + F(x, ω, t)·sign ω + T0 + slope·(x − zero) + C·v·|v| + cogging(x) + vibration(t)
 //!
-//! with F = Tc ± direction + Ts·exp(−(v/vs)²) + spot(x) + drop·exp(−t/τ), never below a twentieth of Tc.
+//! with F = Tc ± direction + Ts·exp(−|v/vs|ⁿ) + spot(x) + drop·exp(−t/τ), never below a twentieth of Tc.
 
 use super::outside::Outside;
 use super::rig::Rig;
@@ -47,7 +47,7 @@ pub struct Truth {
     pub coulomb_by_direction: f64,
     pub asymmetry: f64,
     /// Torque, and speed in load units/s.
-    pub stribeck: (f64, f64),
+    pub stribeck: (f64, f64, f64),
     /// Dry friction is F·tanh(ω/this) where not 0.
     pub regularised: f64,
     /// Displacement in units of q; 0: set-valued Coulomb friction.
@@ -56,8 +56,8 @@ pub struct Truth {
     pub bristle_damping: f64,
     pub coupling: Option<Coupling>,
     pub cogging: Sine,
-    /// Centre, peak, width (to 1/e) of a tight spot.
-    pub spot: (f64, f64, f64),
+    /// Centre, peak, width (to 1/e) of a tight spot, and the exponent of its form.
+    pub spot: (f64, f64, f64, f64),
     /// Slope per load unit, and the position of no force.
     pub cable: (f64, f64),
     /// Torque per (m/s)², 1 m = 1000 load units.
@@ -87,13 +87,13 @@ impl Truth {
             constant: rig.constant,
             coulomb_by_direction: 0.0,
             asymmetry: 0.0,
-            stribeck: (0.0, 1.0),
+            stribeck: (0.0, 1.0, 2.0),
             regularised: 0.0,
             presliding: 0.0,
             bristle_damping: 0.0,
             coupling: None,
             cogging: Sine::default(),
-            spot: (0.0, 0.0, 1.0),
+            spot: (0.0, 0.0, 1.0, 2.0),
             cable: (0.0, 0.0),
             drag: 0.0,
             drift: (0.0, 1.0),
@@ -112,10 +112,10 @@ impl Truth {
     pub fn dry(&self, t: f64, q: f64, w: f64, direction: f64) -> f64 {
         let mut level = self.coulomb + self.coulomb_by_direction * direction;
         if self.stribeck.0 != 0.0 {
-            level += self.stribeck.0 * (-(w * self.unit / self.stribeck.1).powi(2)).exp();
+            level += self.stribeck.0 * (-(w * self.unit / self.stribeck.1).abs().powf(self.stribeck.2)).exp();
         }
         if self.spot.1 != 0.0 {
-            level += self.spot.1 * (-((q * self.unit - self.spot.0) / self.spot.2).powi(2)).exp();
+            level += self.spot.1 * (-((q * self.unit - self.spot.0) / self.spot.2).abs().powf(self.spot.3)).exp();
         }
         if self.drift.0 != 0.0 {
             level += self.drift.0 * (-t / self.drift.1).exp();

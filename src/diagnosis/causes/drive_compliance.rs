@@ -3,30 +3,40 @@
 
 use super::table_side;
 use super::*;
+use crate::diagnosis::many::dot;
 use std::f64::consts::TAU;
 
 /// Damping ratio up to which a spring is looked for. Drives have a tenth of one and less; a fit that stops at this bound has
 /// found no swing, and imitates what else happens at reversals.
 const MOST_DAMPING: f64 = 0.3;
 
+/// Fastest resonance that is looked for, Hz.
+const FASTEST_HZ: f64 = 2000.0;
+
 /// Ratio of a start's frequency to the one before.
 const STEP: f64 = 1.08;
+
+/// Shares of inertia and friction on the table's side at a start.
+const SHARE: f64 = 0.5;
+const FRICTION_SHARE: f64 = 0.7;
 
 /// Parameters: resonance in Hz, share of the inertia and of the friction on the table's side, damping ratio.
 pub static LAW: Law = Law {
     cause: Cause::DriveCompliance,
     scales: &[
-        Scale::Log(3.0, 2000.0),
+        Scale::Log(3.0, FASTEST_HZ),
         Scale::Linear(0.04, 0.95, 0.01),
         Scale::Linear(0.02, 0.98, 0.02),
         Scale::Log(2e-3, MOST_DAMPING),
     ],
-    starts: |frame, _| {
+    starts: |frame, rest| {
         // Behind a motor that moves as measured the table swings at its own frequency √(k/J₂), within a band of twice the
         // damping ratio: starts farther apart than that would miss it.
-        let (least, most, share) = (8.0, (0.25 / frame.columns.period_s).min(300.0), 0.5f64);
+        let (least, most) = (8.0, (0.25 / frame.columns.period_s).min(300.0));
         let count = ((most / least).ln() / STEP.ln()).ceil().max(2.0) as usize;
-        log_spaced(least, most, count).map(|own| vec![own / (1.0 - share).sqrt(), share, 0.7, 0.04]).collect()
+        let swinging = log_spaced(least, most, count);
+        let own = swinging.chain(wound_up(frame, rest.table).filter(|own| *own > most));
+        own.map(|own| vec![own / (1.0 - SHARE).sqrt(), SHARE, FRICTION_SHARE, 0.04]).collect()
     },
     // How the table swings by itself is found sooner than what is whose: a fit that damps it until it hardly swings has found the one
     // and strayed in the other.
@@ -71,4 +81,17 @@ fn effect(frame: &Frame, shape: &[f64]) -> Option<Effect> {
         table_friction_share,
         damping_ratio,
     })
+}
+
+/// The table's own frequency √(k/J₂), Hz, by how far the drive winds up under what it carries: of a spring too fast to be seen
+/// swinging, but soft enough for a scale on the table. `None` without one, or where the table does not lag.
+fn wound_up(frame: &Frame, table: &[f64]) -> impl Iterator<Item = f64> {
+    let (b, unit) = (&frame.belief, frame.unit);
+    let inertia = SHARE * b.inertia;
+    let carried = frame.judged_by(|i| {
+        inertia * frame.a[i] * unit + FRICTION_SHARE * (b.coulomb * frame.direction[i] + b.viscous * frame.v[i] * unit)
+    });
+    let per_torque = -unit * dot(&carried, table) / dot(&carried, &carried).max(1e-300);
+    let own = (1.0 / (per_torque * inertia)).sqrt() / TAU;
+    (own.is_finite() && own < FASTEST_HZ * (1.0 - SHARE).sqrt()).then_some(own).into_iter()
 }

@@ -75,6 +75,9 @@ pub enum Scale {
     Log(f64, f64),
     /// Within bounds, with a step over which the trace changes but little.
     Linear(f64, f64, f64),
+    /// Positive, by its logarithm, within bounds; what a law is not sure to be, and has at the last value until what it leaves
+    /// says otherwise.
+    Form(f64, f64, f64),
     /// One of the starts, not refined.
     Choice,
 }
@@ -116,6 +119,14 @@ pub struct Law {
 
 /// Of a law that does not stray.
 const NO_RESTARTS: fn(&[f64]) -> Vec<Vec<f64>> = |_| Vec::new();
+
+impl Law {
+    /// Whether a parameter is one of form, and as usual: it is not fitted then.
+    #[must_use]
+    pub fn is_as_usual(&self, index: usize, value: f64) -> bool {
+        matches!(self.scales.get(index), Some(Scale::Form(.., usual)) if *usual == value)
+    }
+}
 
 impl std::fmt::Debug for Law {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -1,14 +1,18 @@
-//! Extra friction at low speed: Ts·exp(−(v/vs)²)·sign(v) (Stribeck 1902; Armstrong-Hélouvry 1991). A dip where negative.
+//! Extra friction at low speed: Ts·exp(−|v/vs|ⁿ)·sign(v) (Stribeck 1902; Armstrong-Hélouvry 1991), n = 2 unless the recording says
+//! otherwise (Bo and Pavelescu 1982 found 0.5 to 1). A dip where negative.
 
 use super::*;
 
-/// Trace sign(v)·exp(−(v/vs)²), vs in load units/s.
+/// The usual exponent.
+const GAUSSIAN: f64 = 2.0;
+
+/// Parameters: vs in load units/s, and n. The coefficient is Ts.
 pub static LAW: Law = Law {
     cause: Cause::StribeckFriction,
-    scales: &[Scale::Log(1e-4, 1e4)],
+    scales: &[Scale::Log(1e-4, 1e4), Scale::Form(0.4, 8.0, GAUSSIAN)],
     starts: |frame, _| {
         let top = frame.top_speed();
-        log_spaced(2e-3 * top, 0.4 * top, 12).map(|v| vec![v]).collect()
+        log_spaced(2e-3 * top, 0.4 * top, 12).map(|v| vec![v, GAUSSIAN]).collect()
     },
     restarts: NO_RESTARTS,
     starts_from_rest: false,
@@ -17,17 +21,17 @@ pub static LAW: Law = Law {
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let per = 1.0 / shape[0];
-            Term::torque(frame.fading(&frame.v, move |v| (v * per).powi(2)))
+            Term::torque(frame.fading_by(&frame.v, shape[1], move |v| v * per))
         })
     },
     effect: |frame, shape, c| {
-        let (torque, velocity_mm_s) = (*c.first()?, *shape.first()?);
+        let (torque, velocity_mm_s, exponent) = (*c.first()?, shape[0], shape[1]);
         let sound = torque > -1.2 * frame.belief.coulomb && velocity_mm_s < 0.6 * frame.top_speed();
-        sound.then_some(Effect::StribeckFriction { torque, velocity_mm_s })
+        sound.then_some(Effect::StribeckFriction { torque, velocity_mm_s, exponent })
     },
     confused_with: &[Cause::CoulombFrictionMismatch, Cause::PreslidingFriction],
     sentence: |effect, axis| match effect {
-        Effect::StribeckFriction { torque, velocity_mm_s } => format!(
+        Effect::StribeckFriction { torque, velocity_mm_s, .. } => format!(
             "Below about {} {}/s friction {} by {} {}: {}.",
             say(*velocity_mm_s),
             load(axis),

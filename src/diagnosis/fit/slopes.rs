@@ -1,6 +1,6 @@
 //! How a model changes with the non-linear parameters of its parts, by central differences, each in the step of its scale.
 
-use super::{Bench, Fit, Part};
+use super::{Bench, Fit, Part, projected};
 use crate::diagnosis::causes::Scale;
 
 /// The derivative of the model by one non-linear parameter.
@@ -35,6 +35,42 @@ impl Bench<'_, '_> {
             .collect()
     }
 
+    /// The step of each non-linear parameter that takes most off the squares. What the rows do not tell stays where it is: they
+    /// are weighed against a guess that no parameter moves farther than a step may go. One that would, or beyond its bounds,
+    /// goes to there, and the others as is best with it.
+    pub(super) fn steps(&self, fit: &Fit, slopes: &[Slope]) -> Vec<f64> {
+        let columns: Vec<&[f64]> = slopes.iter().map(|s| s.column.as_slice()).collect();
+        let (triangle, along) = projected(&columns, &fit.basis, &fit.residual);
+        let (mut normal, mut right) = (triangle.tr_mul(&triangle), triangle.tr_mul(&along));
+        let noise = fit.squares() / self.measured.len().max(1) as f64;
+        let scale = |slope: &Slope| fit.parts[slope.part].law.scales[slope.index];
+        for (i, slope) in slopes.iter().enumerate() {
+            normal[(i, i)] += noise / scale(slope).farthest().powi(2);
+        }
+        let mut steps = vec![0.0; slopes.len()];
+        let mut ends = vec![false; slopes.len()];
+        for _ in slopes {
+            let Some(solved) = normal.clone().cholesky() else { break };
+            steps.copy_from_slice(solved.solve(&right).as_slice());
+            let possible = |i: usize| {
+                let at = fit.parts[slopes[i].part].shape[slopes[i].index];
+                scale(&slopes[i]).distance(at, scale(&slopes[i]).moved(at, steps[i]))
+            };
+            let too_far = |&i: &usize| !ends[i] && steps[i].abs() > 1.001 * possible(i).abs();
+            let farthest = |i: &usize| steps[*i].abs() / scale(&slopes[*i]).farthest();
+            let Some(i) = (0..slopes.len()).filter(too_far).max_by(|a, b| farthest(a).total_cmp(&farthest(b))) else {
+                break;
+            };
+            // From here on a number: its share moves to the right side.
+            let end = possible(i);
+            right.axpy(-end, &normal.column(i).clone_owned(), 1.0);
+            normal.row_mut(i).fill(0.0);
+            normal.column_mut(i).fill(0.0);
+            (normal[(i, i)], right[i], ends[i]) = (1.0, end, true);
+        }
+        steps
+    }
+
     /// A part with each of its parameters up and down by so many steps, all worked out together.
     pub(super) fn sides(&self, part: &Part, steps: f64) -> Vec<Side> {
         let mut shapes = Vec::new();
@@ -42,7 +78,8 @@ impl Bench<'_, '_> {
         for (index, scale) in part.law.scales.iter().enumerate() {
             let step = match *scale {
                 Scale::Choice => continue,
-                Scale::Log(..) => 0.02 * steps,
+                Scale::Form(.., usual) if usual == part.shape[index] => continue,
+                Scale::Log(..) | Scale::Form(..) => 0.02 * steps,
                 Scale::Linear(_, _, step) => step * steps,
             };
             let at = part.shape[index];
@@ -92,16 +129,27 @@ impl Scale {
     pub fn moved(self, at: f64, step: f64) -> f64 {
         match self {
             Scale::Choice => at,
+            Scale::Log(low, high) | Scale::Form(low, high, _) => {
+                (at * step.clamp(-self.farthest(), self.farthest()).exp()).clamp(low, high)
+            }
+            Scale::Linear(low, high, _) => (at + step.clamp(-self.farthest(), self.farthest())).clamp(low, high),
+        }
+    }
+
+    /// The farthest that one step goes.
+    fn farthest(self) -> f64 {
+        match self {
+            Scale::Choice => 0.0,
             // More than a doubling at once is no small step.
-            Scale::Log(low, high) => (at * step.clamp(-0.7, 0.7).exp()).clamp(low, high),
-            Scale::Linear(low, high, unit) => (at + step.clamp(-40.0 * unit, 40.0 * unit)).clamp(low, high),
+            Scale::Log(..) | Scale::Form(..) => 0.7,
+            Scale::Linear(_, _, unit) => 40.0 * unit,
         }
     }
 
     fn distance(self, from: f64, to: f64) -> f64 {
         match self {
             Scale::Choice => 0.0,
-            Scale::Log(..) => (to / from).ln(),
+            Scale::Log(..) | Scale::Form(..) => (to / from).ln(),
             Scale::Linear(..) => to - from,
         }
     }
@@ -111,7 +159,7 @@ impl Scale {
     pub fn rate(self, at: f64) -> f64 {
         match self {
             Scale::Choice => 0.0,
-            Scale::Log(..) => at,
+            Scale::Log(..) | Scale::Form(..) => at,
             Scale::Linear(..) => 1.0,
         }
     }

@@ -28,7 +28,7 @@ impl Foreign {
     }
 }
 
-pub static LAWS: [Foreign; 20] = [
+pub static LAWS: [Foreign; 19] = [
     Foreign {
         goes: "with the cube of speed",
         numbers: 1,
@@ -108,12 +108,6 @@ pub static LAWS: [Foreign; 20] = [
         numbers: 3,
         somewhere: true,
         regressors: |frame, share| on_either_side(frame, share, |_| 1.0),
-    },
-    Foreign {
-        goes: "as a step of friction along the stroke",
-        numbers: 3,
-        somewhere: true,
-        regressors: |frame, share| on_either_side(frame, share, |i| frame.direction[i]),
     },
     Foreign {
         goes: "as a torque that wanders in time",
