@@ -7,7 +7,7 @@ use super::causes::presliding_friction::{BRISTLE, ELEMENTS, OF_ANY_EXPONENT};
 use super::causes::{Law, law};
 use super::fit::{Bench, Fit};
 use super::progress::{Stopped, Watch};
-use super::select::{LEAST_STRENGTH, Selection, is_physical, price, shrink};
+use super::select::{LEAST_GAIN, LEAST_STRENGTH, Selection, is_physical, is_within_bounds, price, shrink};
 use super::uncertainty;
 use super::verdict::block_t;
 use crate::machine::{Cause, Effect};
@@ -17,6 +17,8 @@ const OWN_STEPS: usize = 5;
 const STEPS: usize = 8;
 /// Squares over the least up to which a fit by itself is refined with the others.
 const WITHIN_REACH: f64 = 1.3;
+/// Gain from which on another formulation is refined in any case: what a cause must gain.
+const MUCH: f64 = LEAST_GAIN;
 /// Below this mean over scatter of what one fit gains over another in each block they are alike.
 const ALIKE: f64 = 2.0;
 
@@ -25,9 +27,7 @@ const ALIKE: f64 = 2.0;
 /// # Errors
 /// [`Stopped`] when the watch's caller said so.
 pub fn settled(bench: &Bench, found: Selection, watch: &Watch) -> Result<Selection, Stopped> {
-    let Some(at) = found.fit.parts.iter().position(|part| part.law.cause == Cause::PreslidingFriction) else {
-        return Ok(found);
-    };
+    let Some(at) = place(&found.fit) else { return Ok(found) };
     // What is tried is refined by itself first: that is enough to see whether it is worth more.
     let mut parts = found.fit.parts.clone();
     let sought = parts.remove(at);
@@ -42,12 +42,15 @@ pub fn settled(bench: &Bench, found: Selection, watch: &Watch) -> Result<Selecti
     let mut others = [BRISTLE, ELEMENTS].map(|kind| with(&OF_ANY_EXPONENT, kind));
     others.sort_by(|a, b| a.squares().total_cmp(&b.squares()));
     let [best, other] = others;
-    if price(&best) < price(&plain) && is_another(bench, &best, last) {
+    // Beside what only stands in for it an exponent is not sure before all are refined.
+    let much_less = price(&best) < price(&plain) - MUCH;
+    if much_less || price(&best) < price(&plain) && is_another(bench, &best, last) {
         let alike = other.squares() <= WITHIN_REACH * best.squares();
-        let refined = |fit: Fit| Some(bench.refine(fit, 0, STEPS)).filter(|fit| is_physical(bench, fit));
+        let refined = |fit: Fit| sound(bench, bench.refine(fit, 0, STEPS));
         let mut fits: Vec<Fit> = std::iter::once(best).chain(alike.then_some(other)).filter_map(refined).collect();
         fits.sort_by(|a, b| a.squares().total_cmp(&b.squares()));
-        if fits.first().is_some_and(|fit| price(fit) < price(&plain) && is_another(bench, fit, last)) {
+        let is_another = |fit: &Fit| place(fit).is_some_and(|at| is_another(bench, fit, at));
+        if fits.first().is_some_and(|fit| price(fit) < price(&plain) && is_another(fit)) {
             let fit = fits.remove(0);
             fits.retain(|other| block_t(bench, other, &fit) < ALIKE);
             return without_substitutes(bench, Selection { fit, alike: fits, ..found }, watch);
@@ -55,6 +58,21 @@ pub fn settled(bench: &Bench, found: Selection, watch: &Watch) -> Result<Selecti
     }
     let fit = if is_plain { plain } else { bench.refine(plain, 0, STEPS) };
     Ok(if is_physical(bench, &fit) { Selection { fit, ..found } } else { found })
+}
+
+/// Where friction that builds up is among the parts.
+fn place(fit: &Fit) -> Option<usize> {
+    fit.parts.iter().position(|part| part.law.cause == Cause::PreslidingFriction)
+}
+
+/// A fit, if need be without the parts that have left their bounds; `None` where that does not help.
+fn sound(bench: &Bench, fit: Fit) -> Option<Fit> {
+    if is_physical(bench, &fit) {
+        return Some(fit);
+    }
+    let within = (0..fit.parts.len()).filter(|&i| is_within_bounds(bench, &fit, i));
+    let fit = bench.refine(bench.fit(within.map(|i| fit.parts[i].clone()).collect()), 0, STEPS);
+    Some(fit).filter(|fit| is_physical(bench, fit))
 }
 
 /// The selection without causes that only stood in for what the law did not have.
