@@ -14,11 +14,13 @@ pub use slopes::Slope;
 use super::causes::{Law, Rest, Term, Trace};
 use super::frame::Frame;
 use super::many::{add, dot};
+use super::progress::{Stopped, Watch};
 use crate::machine::Effect;
 use crate::plant::linear::decomposed;
 use nalgebra::{DMatrix, DVector};
+use slopes::Side;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// How much larger than at a start the trace of a cause without coefficients is taken to become.
 const MOST_SIZE: f64 = 2.0;
@@ -52,6 +54,8 @@ pub struct Part {
     // Shared: sets of causes are copied often, their columns never change.
     fixed: Option<Arc<[f64]>>,
     columns: Arc<[Vec<f64>]>,
+    /// The part to either side of where it stands, once somebody has asked for it.
+    sides: Arc<OnceLock<Vec<Side>>>,
 }
 
 /// A fitted set of causes.
@@ -111,7 +115,7 @@ impl<'f, 'a> Bench<'f, 'a> {
         let terms = (law.terms)(self.frame, &shapes);
         let part = |(shape, Term { fixed, regressors }): (Vec<f64>, Term)| {
             let columns = regressors.iter().map(|trace| self.stack(trace)).collect();
-            Part { law, shape, fixed: fixed.map(|trace| self.stack(&trace).into()), columns }
+            Part { law, shape, fixed: fixed.map(|trace| self.stack(&trace).into()), columns, sides: Arc::default() }
         };
         shapes.into_iter().zip(terms).map(part).collect()
     }
@@ -144,7 +148,7 @@ impl<'f, 'a> Bench<'f, 'a> {
         // R of the decomposition, for the coefficients.
         let mut triangle: Vec<Vec<f64>> = Vec::new();
         for column in parts.iter().flat_map(|part| part.columns.iter()) {
-            let (direction, weights) = orthonormal(column, &basis);
+            let (direction, weights) = orthonormal(column, &basis, &[]);
             basis.push(direction);
             triangle.push(weights);
         }
@@ -206,17 +210,32 @@ impl<'f, 'a> Bench<'f, 'a> {
     /// Refines the non-linear parameters of the parts from index `first` on, until a step brings nothing.
     #[must_use]
     pub fn refine(&self, fit: Fit, first: usize, most: usize) -> Fit {
-        self.refine_while(fit, first, most, 1e-5)
+        self.refine_while(fit, first, most, 1e-5, |_| ())
+    }
+
+    /// The same of a set with nothing else to do beside it: on all cores at hand.
+    ///
+    /// # Errors
+    /// [`Stopped`] when the watch's caller said so.
+    pub fn refine_across(&self, fit: Fit, most: usize, watch: &Watch) -> Result<Fit, Stopped> {
+        let look_about = |fit: &Fit| {
+            let look = |part: &Part| _ = self.both_sides(part);
+            // Who says stop is heard after the fit.
+            _ = watch.each(&fit.parts, (0.8, 0.8), "fitting causes", look);
+        };
+        let fit = self.refine_while(fit, 0, most, 1e-5, look_about);
+        watch.at(0.8, "fitting causes").map(|()| fit)
     }
 
     /// The same until a step takes less than a thousandth off the squares: enough to compare sets of causes.
     #[must_use]
     pub fn refine_roughly(&self, fit: Fit, first: usize, most: usize) -> Fit {
-        self.refine_while(fit, first, most, 1e-3)
+        self.refine_while(fit, first, most, 1e-3, |_| ())
     }
 
-    fn refine_while(&self, mut fit: Fit, first: usize, most: usize, least: f64) -> Fit {
+    fn refine_while(&self, mut fit: Fit, first: usize, most: usize, least: f64, look_about: impl Fn(&Fit)) -> Fit {
         for _ in 0..most {
+            look_about(&fit);
             let slopes = self.slopes(&fit, first);
             if slopes.is_empty() {
                 break;
@@ -396,15 +415,16 @@ pub fn pseudo_inverse(matrix: DMatrix<f64>, least: f64) -> Option<DMatrix<f64>> 
     decomposed(matrix)?.pseudo_inverse(least).ok()
 }
 
-/// The part of a column that stands on the basis, with unit length, and its weights on basis and itself. A column that
+/// The part of a column that stands on a basis of two pieces, with unit length, and its weights on basis and itself. A column that
 /// the basis already spans gives a zero column.
-pub(super) fn orthonormal(column: &[f64], basis: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn orthonormal(column: &[f64], basis: &[Vec<f64>], more: &[Vec<f64>]) -> (Vec<f64>, Vec<f64>) {
     let mut c = column.to_vec();
-    let mut weights = vec![0.0; basis.len() + 1];
+    let count = basis.len() + more.len();
+    let mut weights = vec![0.0; count + 1];
     let (whole, mut length) = (dot(column, column).sqrt(), f64::INFINITY);
     // Taking off most of a column leaves rounding errors along the basis, which a second time takes off (Parlett 1980).
     for _ in 0..2 {
-        for (direction, weight) in basis.iter().zip(&mut weights) {
+        for (direction, weight) in basis.iter().chain(more).zip(&mut weights) {
             let along = dot(direction, &c);
             // Levels of different pieces have nothing in common.
             if along != 0.0 {
@@ -419,7 +439,7 @@ pub(super) fn orthonormal(column: &[f64], basis: &[Vec<f64>]) -> (Vec<f64>, Vec<
     }
     if length > 1e-6 * whole && length > 0.0 {
         c.iter_mut().for_each(|c| *c /= length);
-        weights[basis.len()] = length;
+        weights[count] = length;
     } else {
         c.fill(0.0);
     }
@@ -428,14 +448,14 @@ pub(super) fn orthonormal(column: &[f64], basis: &[Vec<f64>]) -> (Vec<f64>, Vec<
 
 /// What a basis leaves of columns, as R of their decomposition, and a target along its directions.
 fn projected(columns: &[&[f64]], basis: &[Vec<f64>], target: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
-    let mut all = basis.to_vec();
+    let mut own: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
     let mut triangle = DMatrix::zeros(columns.len(), columns.len());
     for (j, column) in columns.iter().enumerate() {
-        let (direction, weights) = orthonormal(column, &all);
-        all.push(direction);
+        let (direction, weights) = orthonormal(column, basis, &own);
+        own.push(direction);
         weights.iter().skip(basis.len()).enumerate().for_each(|(i, weight)| triangle[(i, j)] = *weight);
     }
-    let along = all.iter().skip(basis.len()).map(|direction| dot(direction, target));
+    let along = own.iter().map(|direction| dot(direction, target));
     (triangle, DVector::from_iterator(columns.len(), along))
 }
 

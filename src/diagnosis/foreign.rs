@@ -40,7 +40,9 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
     };
     // A law of few numbers that does is what is there; one of any form is asked where something is left, or much was needed.
     let open = found.parts.len() > FEW || Excess::of(bench, found, found).largest() > LITTLE_LEFT;
-    let laws: Vec<&'static Foreign> = LAWS.iter().filter(|law| open || !law.takes_any_form()).collect();
+    let mut laws: Vec<&'static Foreign> = LAWS.iter().filter(|law| open || !law.takes_any_form()).collect();
+    // What takes longest is begun first.
+    laws.sort_by_key(|law| !law.somewhere);
     let mut near: Vec<(f64, &'static Foreign, f64)> =
         watch.each(&laws, (0.9, 0.91), STAGE, first_place)?.into_iter().flatten().collect();
     near.retain(|(share, ..)| *share > LEAST);

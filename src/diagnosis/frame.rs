@@ -246,16 +246,17 @@ impl<'a> Frame<'a> {
     /// Weighted sum of the rows about each judged row, `offset` rows later. The rows that are not judged are not worked out.
     fn weighed(&self, values: &[f64], kernel: &[f64], offset: isize) -> Vec<f64> {
         let first = offset - (kernel.len() / 2) as isize;
+        let mut sums = vec![0.0; self.kept.len()];
         widest(
             #[inline(always)]
             || {
-                let at = |&row: &usize| {
+                for (sum, row) in sums.iter_mut().zip(&self.kept) {
                     let begin = row.saturating_add_signed(first);
-                    values.get(begin..begin + kernel.len()).map_or(0.0, |window| product(window, kernel))
-                };
-                self.kept.iter().map(at).collect()
+                    *sum = values.get(begin..begin + kernel.len()).map_or(0.0, |window| product(window, kernel));
+                }
             },
-        )
+        );
+        sums
     }
 
     /// table − encoder at the judged rows; empty without a table scale.
@@ -329,7 +330,22 @@ impl<'a> Frame<'a> {
         let late_s = self.believed_late_s + late_s;
         let shift = (self.sampling.shift_s + late_s) / self.columns.period_s;
         let flattened = self.lateness.flattened_s2(late_s) / self.columns.period_s.powi(2);
-        self.kept.iter().map(|&i| flattened_at(&self.torque, i as f64 + shift, -flattened)).collect()
+        // Between the rows it is the same sum of neighbours everywhere; at the ends the series is held.
+        let rows = shift.floor();
+        let weight = |k: usize| {
+            let mut one = [0.0; 8];
+            one[k] = 1.0;
+            flattened_at(&one, 3.0 + shift - rows, -flattened)
+        };
+        let weights: [f64; 6] = std::array::from_fn(|k| weight(k + 1));
+        let at = |&row: &usize| {
+            let window = row.checked_add_signed(rows as isize - 2).and_then(|begin| self.torque.get(begin..begin + 6));
+            window.map_or_else(
+                || flattened_at(&self.torque, row as f64 + shift, -flattened),
+                |window| window.iter().zip(weights).map(|(torque, weight)| torque * weight).sum(),
+            )
+        };
+        self.kept.iter().map(at).collect()
     }
 
     /// Noise floor of a filtered column at the judged rows, in its unit: what white noise through the filter would be,

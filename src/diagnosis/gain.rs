@@ -5,7 +5,7 @@ use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
 use super::progress::{Stopped, Watch};
 use crate::machine::{Axis, Effect};
-use crate::plant::closed_loop::predict;
+use crate::plant::closed_loop::{ByServo, predict_by};
 use crate::plant::observed::Observed;
 use crate::plant::predict::{TorquePrediction, predict_torque};
 
@@ -26,8 +26,8 @@ pub struct Gain {
 /// torque where the axis stands, since friction then is not a function of the motion.
 pub type Errors = [Option<Vec<f64>>; 3];
 
-fn errors(axis: &Axis, observed: &Observed) -> Option<Errors> {
-    let prediction = predict(axis, observed).ok()?;
+fn errors(axis: &Axis, observed: &Observed, servo: &ByServo) -> Option<Errors> {
+    let prediction = predict_by(axis, observed, servo).ok()?;
     let less =
         |measured: &[f64], model: &[f64]| -> Vec<f64> { measured.iter().zip(model).map(|(m, p)| m - p).collect() };
     let replayed = prediction.closed_loop.as_ref();
@@ -51,7 +51,9 @@ fn torque_errors(observed: &Observed, prediction: &TorquePrediction) -> Vec<f64>
 /// [`Stopped`] when the watch's caller said so.
 pub fn on_holdout(axis: &Axis, extended: &Axis, holdout: &Holdout, watch: &Watch) -> Result<[Vec<Gain>; 2], Stopped> {
     let Holdout { observed, weight } = holdout;
-    let both = watch.each(&[axis, extended], (0.92, 0.99), "measuring the gain", |axis| errors(axis, observed))?;
+    let servo = ByServo::of(axis, observed);
+    let both =
+        watch.each(&[axis, extended], (0.92, 0.99), "measuring the gain", |axis| errors(axis, observed, &servo))?;
     let [Some(before), Some(after)] = both.as_slice() else { return Ok([Vec::new(), Vec::new()]) };
     let judged = |errors| in_judged_rows(errors, weight);
     Ok([gains(axis, before, after), gains(axis, &judged(before), &judged(after))])
@@ -88,7 +90,7 @@ pub struct HeldOut<'g, 'f, 'a> {
     axis: &'g Axis,
     bench: &'g Bench<'f, 'a>,
     watch: &'g Watch<'g>,
-    observed: Option<Observed>,
+    observed: Option<(Observed, ByServo)>,
     /// The half that each row belongs to, see [`half_of_rows`].
     half: Vec<usize>,
     /// What each row's torque says of a law, see [`weight_of_rows`].
@@ -106,13 +108,18 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
         }
         let half = observed.as_ref().map_or_else(Vec::new, |observed| half_of_rows(bench, &observed.time_s));
         let weight = observed.as_ref().map_or_else(Vec::new, |observed| weight_of_rows(bench.frame, &observed.time_s));
+        let observed = observed.map(|observed| {
+            let servo = ByServo::of(axis, &observed);
+            (observed, servo)
+        });
         Self { axis, bench, watch, observed, half, weight }
     }
 
     /// Errors of the belief alone; `None` where nothing can be predicted.
     #[must_use]
     pub fn believed(&self) -> Option<Errors> {
-        errors(self.axis, self.observed.as_ref()?)
+        let (observed, servo) = self.observed.as_ref()?;
+        errors(self.axis, observed, servo)
     }
 
     /// Errors of the belief with a set of causes; `None` where nothing can be predicted.
@@ -120,9 +127,10 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
     /// # Errors
     /// [`Stopped`] when the watch's caller said so.
     pub fn errors(&self, fit: &Fit) -> Result<Option<Errors>, Stopped> {
-        let Some(observed) = &self.observed else { return Ok(None) };
+        let Some((observed, servo)) = &self.observed else { return Ok(None) };
         let machines: Vec<Axis> = (0..2).map(|half| fitted_without(self.axis, self.bench, fit, half)).collect();
-        let of_half = self.watch.each(&machines, (0.92, 0.99), "measuring the gain", |axis| errors(axis, observed))?;
+        let of_half =
+            self.watch.each(&machines, (0.92, 0.99), "measuring the gain", |axis| errors(axis, observed, servo))?;
         let (Some(Some(even)), Some(Some(odd))) = (of_half.first(), of_half.last()) else { return Ok(None) };
         Ok(Some(std::array::from_fn(|channel| {
             let (even, odd) = (even[channel].as_ref()?, odd[channel].as_ref()?);
@@ -133,7 +141,7 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
     /// RMS of the torque while the axis moves, by a machine with this set of causes.
     #[must_use]
     pub fn torque_error(&self, fit: &Fit) -> Option<f64> {
-        let observed = self.observed.as_ref()?;
+        let (observed, _) = self.observed.as_ref()?;
         let prediction = predict_torque(&fitted_without(self.axis, self.bench, fit, NEITHER), observed).ok()?;
         let moving = torque_errors(observed, &prediction);
         let (sum, count) = moving.iter().filter(|e| e.is_finite()).fold((0.0, 0.0), |(s, n), e| (s + e * e, n + 1.0));

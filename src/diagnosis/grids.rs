@@ -207,7 +207,7 @@ fn sharpened(mut grid: f64, readings: &[f64]) -> f64 {
 fn cleared(columns: &[Vec<f64>], basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let mut all = basis.to_vec();
     for column in columns {
-        let (own, weights) = orthonormal(column, &all);
+        let (own, weights) = orthonormal(column, &all, &[]);
         if weights[all.len()] > 0.0 {
             all.push(own);
         }

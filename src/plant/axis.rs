@@ -7,6 +7,7 @@
 
 use super::coupling::transmitted;
 use super::friction::Friction;
+use super::nearby::Nearby;
 use super::physics::Physics;
 use crate::machine::TwoMasses;
 
@@ -21,6 +22,8 @@ pub struct Body {
     lag: (f64, f64),
     plain: bool,
     viscous: f64,
+    /// The torques near where motor and table are.
+    nearby: [Nearby; 2],
     state: State,
 }
 
@@ -90,20 +93,23 @@ impl Body {
         let plain = physics.is_plain();
         let load_per_motor = 1.0 / physics.motor_per_load;
         let viscous = physics.slope_at(1.0);
+        let nearby = [Nearby::new(&physics), Nearby::new(&physics)];
         let state = State { time_s: 0.0, torque, motor, table };
-        Body { physics, step_s, load_per_motor, lag, plain, viscous, state }
+        Body { physics, step_s, load_per_motor, lag, plain, viscous, nearby, state }
     }
 
     /// Advances by `steps` plant steps while the servo asks for `asked`.
     pub fn advance(&mut self, asked: f64, steps: usize) {
         let mut state = self.state;
+        let mut nearby = std::mem::take(&mut self.nearby);
+        let near = &mut nearby;
         match (&self.physics.two_masses, self.plain) {
-            (None, true) => (0..steps).for_each(|_| self.rigid_step::<true>(&mut state, asked)),
-            (None, false) => (0..steps).for_each(|_| self.rigid_step::<false>(&mut state, asked)),
-            (Some(masses), true) => (0..steps).for_each(|_| self.two_mass_step::<true>(masses, &mut state, asked)),
-            (Some(masses), false) => (0..steps).for_each(|_| self.two_mass_step::<false>(masses, &mut state, asked)),
+            (None, true) => (0..steps).for_each(|_| self.rigid_step::<true>(near, &mut state, asked)),
+            (None, false) => (0..steps).for_each(|_| self.rigid_step::<false>(near, &mut state, asked)),
+            (Some(m), true) => (0..steps).for_each(|_| self.two_mass_step::<true>(m, near, &mut state, asked)),
+            (Some(m), false) => (0..steps).for_each(|_| self.two_mass_step::<false>(m, near, &mut state, asked)),
         }
-        self.state = state;
+        (self.state, self.nearby) = (state, nearby);
     }
 
     /// Mean torque of the motor over a step.
@@ -115,7 +121,7 @@ impl Body {
     }
 
     #[inline(always)]
-    fn rigid_step<const PLAIN: bool>(&self, state: &mut State, asked: f64) {
+    fn rigid_step<const PLAIN: bool>(&self, [near, _]: &mut [Nearby; 2], state: &mut State, asked: f64) {
         let (h, p) = (self.step_s, &self.physics);
         let torque = self.motor_torque(state, asked);
         let m = &mut state.motor;
@@ -124,14 +130,20 @@ impl Body {
             m.kick(h, middle, torque - p.constant_torque(), self.viscous, p.coulomb());
         } else {
             let (x, v, t) = (middle * self.load_per_motor, m.velocity * self.load_per_motor, state.time_s);
-            let torque = p.delivered(torque) - p.load(x, v, t) - p.cogging_torque(x);
-            m.kick(h, middle, torque, p.slope_at(m.velocity), p.friction_level(x, v, t));
+            let torque = p.delivered(torque) - near.load(p, x, v, t) - near.cogging_torque(x);
+            m.kick(h, middle, torque, p.slope_at(m.velocity), near.friction_level(p, x, v, t));
         }
         state.time_s += h;
     }
 
     #[inline(always)]
-    fn two_mass_step<const PLAIN: bool>(&self, masses: &TwoMasses, state: &mut State, asked: f64) {
+    fn two_mass_step<const PLAIN: bool>(
+        &self,
+        masses: &TwoMasses,
+        [at_motor, at_table]: &mut [Nearby; 2],
+        state: &mut State,
+        asked: f64,
+    ) {
         let (h, p) = (self.step_s, &self.physics);
         let torque = self.motor_torque(state, asked);
         let (motor, table) = (&mut state.motor, &mut state.table);
@@ -144,10 +156,12 @@ impl Body {
         } else {
             let t = state.time_s;
             let (x, v) = (motor_middle * self.load_per_motor, motor.velocity * self.load_per_motor);
-            let torque = p.delivered(torque) - p.cogging_torque(x);
-            motor.kick(h, motor_middle, torque - push, p.slope_at(motor.velocity), p.friction_level(x, v, t));
+            let torque = p.delivered(torque) - at_motor.cogging_torque(x);
+            let level = at_motor.friction_level(p, x, v, t);
+            motor.kick(h, motor_middle, torque - push, p.slope_at(motor.velocity), level);
             let (x, v) = (table_middle * self.load_per_motor, table.velocity * self.load_per_motor);
-            table.kick(h, table_middle, push - p.load(x, v, t), p.slope_at(table.velocity), p.friction_level(x, v, t));
+            let (load, level) = (at_table.load(p, x, v, t), at_table.friction_level(p, x, v, t));
+            table.kick(h, table_middle, push - load, p.slope_at(table.velocity), level);
         }
         state.time_s += h;
     }

@@ -41,11 +41,37 @@ pub struct Prediction {
 /// # Errors
 /// As [`predict_torque`] and [`replay`].
 pub fn predict(axis: &Axis, observed: &Observed) -> Result<Prediction, String> {
+    predict_by(axis, observed, &ByServo::of(axis, observed))
+}
+
+/// What a recording says of the servo by its law alone: the same of every machine with that drive and servo.
+#[derive(Debug)]
+pub struct ByServo {
+    speed: CommandSpeed,
+    /// What was added to the servo's torque by the usual speed, and by the one that it seems to take where that is another.
+    added: [Option<Added>; 2],
+}
+
+impl ByServo {
+    /// That of a recording.
+    #[must_use]
+    pub fn of(axis: &Axis, observed: &Observed) -> Self {
+        let speed = command_speed(axis, observed);
+        let other = (speed != CommandSpeed::Central).then(|| added(axis, observed, speed)).flatten();
+        Self { speed, added: [added(axis, observed, CommandSpeed::Central), other] }
+    }
+}
+
+/// [`predict`] by what is known of the servo.
+///
+/// # Errors
+/// As [`predict_torque`] and [`replay`].
+pub fn predict_by(axis: &Axis, observed: &Observed, servo: &ByServo) -> Result<Prediction, String> {
     let mut torque = predict_torque(axis, observed)?;
-    let mut best = Replays::of(axis, observed, &torque, CommandSpeed::Central)?;
-    let speed = command_speed(axis, observed);
+    let mut best = Replays::of(axis, observed, &torque, CommandSpeed::Central, servo.added[0].as_ref())?;
+    let speed = servo.speed;
     if speed != CommandSpeed::Central {
-        let other = Replays::of(axis, observed, &torque, speed)?;
+        let other = Replays::of(axis, observed, &torque, speed, servo.added[1].as_ref())?;
         // A servo that is another one in truth may seem to take another speed, and does not repeat the position by it.
         if other.error(observed) < best.error(observed) {
             best = other;
@@ -75,13 +101,14 @@ impl Replays {
         observed: &Observed,
         torque: &TorquePrediction,
         command_speed: CommandSpeed,
+        added: Option<&Added>,
     ) -> Result<Self, String> {
         let alone = replay(axis, observed, torque, &[], command_speed)?;
         let mut given = None;
-        if let (Some(alone), Some(added)) = (&alone, added(axis, observed, command_speed)) {
+        if let (Some(alone), Some(added)) = (&alone, added) {
             let with = replay(axis, observed, torque, &added.torque, command_speed)?;
             let felt = |with: &ClosedLoop| error_of(observed, with) < error_of(observed, alone);
-            given = with.filter(felt).map(|with| (added, with));
+            given = with.filter(felt).map(|with| (added.clone(), with));
         }
         Ok(Self { command_speed, alone, given })
     }

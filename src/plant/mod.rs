@@ -9,6 +9,7 @@ pub mod lateness;
 pub mod linear;
 pub mod motion;
 pub mod moves;
+mod nearby;
 pub mod noise;
 pub mod observed;
 pub mod physics;

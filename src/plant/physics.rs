@@ -34,20 +34,12 @@ impl Ripple {
 
 /// A place along the stroke where friction differs.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Spot {
+pub(super) struct Spot {
     centre: f64,
-    peak: f64,
+    pub(super) peak: f64,
     per_width: f64,
     /// Half of the exponent of the distance.
     half_steepness: f64,
-}
-
-impl Spot {
-    /// Friction more at a position.
-    #[inline]
-    fn friction(&self, x: f64) -> f64 {
-        self.peak * fading(power(((x - self.centre) * self.per_width).powi(2), self.half_steepness))
-    }
 }
 
 /// Friction that differs at low speed.
@@ -60,23 +52,37 @@ struct Stribeck {
 }
 
 impl Stribeck {
-    /// Friction more at a speed.
-    #[inline]
-    fn friction(&self, v: f64) -> f64 {
-        self.torque * fading(power((v * self.per_velocity).powi(2), self.half_exponent))
+    /// The power of how many of its speeds a speed is.
+    #[inline(always)]
+    fn velocities(&self, v: f64) -> f64 {
+        power((v * self.per_velocity).powi(2), self.half_exponent)
     }
 }
 
 /// A power, which is dear, of a number that most often is to stay as it is.
-#[inline]
+#[inline(always)]
 fn power(x: f64, exponent: f64) -> f64 {
     if exponent == 1.0 { x } else { x.powf(exponent) }
 }
 
-/// e^−x. Beyond this the exponential is less than a rounding of what it is added to, and it is dear.
+impl Spot {
+    /// The power of how many widths a place is from its centre.
+    #[inline(always)]
+    pub(super) fn widths(&self, x: f64) -> f64 {
+        power(((x - self.centre) * self.per_width).powi(2), self.half_steepness)
+    }
+}
+
+/// Whether e^−x is less than a rounding of what it is added to; it is dear.
+#[inline(always)]
+pub(super) fn is_gone(x: f64) -> bool {
+    !(x < 40.0)
+}
+
+/// e^−x, where it is not gone.
 #[inline]
 fn fading(x: f64) -> f64 {
-    if x < 40.0 { (-x).exp() } else { 0.0 }
+    if is_gone(x) { 0.0 } else { (-x).exp() }
 }
 
 /// The numbers of an axis, ready for evaluation.
@@ -109,7 +115,7 @@ pub struct Physics {
     asymmetry: f64,
     constant: f64,
     stribeck: Option<Stribeck>,
-    spots: Vec<Spot>,
+    pub(super) spots: Vec<Spot>,
     drift: Option<(f64, f64)>,
     cable: Option<(f64, f64)>,
     drag: f64,
@@ -192,15 +198,29 @@ impl Physics {
     #[must_use]
     #[inline]
     pub fn friction_level(&self, x: f64, v: f64, t: f64) -> f64 {
+        let spots = self.spots.iter().map(|spot| spot.peak * fading(spot.widths(x)));
+        self.level(v, t, fading, spots, fading)
+    }
+
+    /// That level by what fades with speed, what tight spots add, and what fades with time.
+    #[inline(always)]
+    pub(super) fn level(
+        &self,
+        v: f64,
+        t: f64,
+        with_speed: impl FnOnce(f64) -> f64,
+        spots: impl Iterator<Item = f64>,
+        with_time: impl FnOnce(f64) -> f64,
+    ) -> f64 {
         let mut level = self.coulomb;
         if let Some(stribeck) = &self.stribeck {
-            level += stribeck.friction(v);
+            level += stribeck.torque * with_speed(stribeck.velocities(v));
         }
-        for spot in &self.spots {
-            level += spot.friction(x);
+        for spot in spots {
+            level += spot;
         }
         if let Some((drop, per_time)) = self.drift {
-            level += drop * fading(t * per_time);
+            level += drop * with_time(t * per_time);
         }
         level.max(0.0)
     }
@@ -230,7 +250,8 @@ impl Physics {
     #[must_use]
     #[inline]
     pub fn slope_at(&self, w: f64) -> f64 {
-        self.viscous + self.asymmetry * w.signum()
+        // Nothing waits for the speed where the slope is the same both ways.
+        if self.asymmetry == 0.0 { self.viscous } else { self.viscous + self.asymmetry * w.signum() }
     }
 
     /// Tc alone.
@@ -249,12 +270,21 @@ impl Physics {
     #[must_use]
     #[inline]
     pub fn load(&self, x: f64, v: f64, t: f64) -> f64 {
-        let mut torque = self.constant + self.drag * v * v.abs();
+        self.load_with(x, v, self.vibration.iter().map(|ripple| ripple.at(t)))
+    }
+
+    /// That torque by what the vibrations are.
+    #[inline(always)]
+    pub(super) fn load_with(&self, x: f64, v: f64, vibration: impl Iterator<Item = f64>) -> f64 {
+        let mut torque = self.constant;
+        if self.drag != 0.0 {
+            torque += self.drag * v * v.abs();
+        }
         if let Some((slope, zero)) = self.cable {
             torque += slope * (x - zero);
         }
-        for ripple in &self.vibration {
-            torque += ripple.at(t);
+        for shaken in vibration {
+            torque += shaken;
         }
         torque
     }

@@ -15,6 +15,7 @@ use super::friction::Friction;
 use super::lateness::Lateness;
 use super::linear::{decomposed, rms};
 use super::motion::{Motion, cubic_at, flattened_at, passed, smoothed};
+use super::nearby::Nearby;
 use super::observed::Observed;
 use super::physics::{Physics, Ripple};
 use crate::machine::{Axis, TwoMasses};
@@ -157,6 +158,8 @@ fn table_torque(physics: &Physics, masses: &TwoMasses, observed: &Observed, run:
     let share = masses.table_friction_share;
     let mut friction = physics.bristle(share);
     let at = |i: usize| (motion.position[i] * scale, motion.velocity[i] * scale);
+    let mut near = Nearby::new(physics);
+    let per_scale = 1.0 / scale;
     let mut recoil = [0.0; 3];
     let (mut q, mut w) = at(run.start);
     // A table in motion is already pushed by its motor.
@@ -167,28 +170,29 @@ fn table_torque(physics: &Physics, masses: &TwoMasses, observed: &Observed, run:
         let span = observed.time_s[i + 1] - observed.time_s[i];
         let steps = (span / longest_step_s(masses, masses.table_inertia)).ceil().clamp(1.0, 1000.0);
         let h = span / steps;
+        let (per_span, per_step, mobility) = (1.0 / span, 1.0 / steps, h / masses.motor_inertia);
         let ((q0, w0), (q1, w1)) = (at(i), at(i + 1));
         let mut sum = 0.0;
         let giving = Giving::new(span, h);
         for step in 0..steps as usize {
-            let s = (step as f64 + 0.5) / steps;
+            let s = (step as f64 + 0.5) * per_step;
             let (motor, speed) = hermite(q0, w0 * span, q1, w1 * span, s);
             let t = observed.time_s[i] - observed.time_s[0] + s * span;
             let middle = q + 0.5 * h * w;
-            let (x, v) = (middle / scale, w / scale);
+            let (x, v) = (middle * per_scale, w * per_scale);
             let [give, giving_speed, _] = recoil;
-            let through = transmitted(masses, motor + give - middle, speed / span + giving_speed - w);
+            let through = transmitted(masses, motor + give - middle, (speed * per_span + giving_speed) - w);
             sum += through;
             if masses.clearance > 0.0 {
-                recoil = giving.step(recoil, through, h / masses.motor_inertia);
+                recoil = giving.step(recoil, through, mobility);
             }
-            let push = through - physics.load(x, v, t) - share * physics.slope_friction(w);
+            let push = through - (near.load(physics, x, v, t) + share * physics.slope_friction(w));
             let next = friction.step(
                 masses.table_inertia,
                 masses.table_inertia * w + h * push,
                 h,
                 w,
-                share * physics.friction_level(x, v, t),
+                share * near.friction_level(physics, x, v, t),
             );
             q = middle + 0.5 * h * next;
             w = next;

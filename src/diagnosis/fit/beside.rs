@@ -2,6 +2,7 @@
 //! trace, and what is left is fitted as if they were not there (Frisch and Waugh 1933, Lovell 1963).
 
 use super::{Bench, Fit, Part, add, dot, orthonormal};
+use std::sync::Arc;
 
 /// Equations beside free columns of the torque.
 pub struct Beside<'f, 'a> {
@@ -18,7 +19,7 @@ impl<'f, 'a> Bench<'f, 'a> {
         let mut directions: Vec<Vec<f64>> = Vec::with_capacity(regressors.len());
         for mut column in regressors {
             column.iter_mut().zip(&self.frame.weights).for_each(|(c, weight)| *c *= weight);
-            let (direction, weights) = orthonormal(&column, &directions);
+            let (direction, weights) = orthonormal(&column, &directions, &[]);
             if weights[directions.len()] > 0.0 {
                 directions.push(direction);
             }
@@ -42,6 +43,7 @@ impl Beside<'_, '_> {
         let part = |part: &Part| Part {
             fixed: part.fixed.as_deref().map(|fixed| cleared(fixed).into()),
             columns: part.columns.iter().map(|column| cleared(column)).collect(),
+            sides: Arc::default(),
             ..part.clone()
         };
         parts.iter().map(part).collect()

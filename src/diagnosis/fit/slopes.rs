@@ -15,6 +15,7 @@ pub struct Slope {
 }
 
 /// A part to either side of where it stands in one parameter.
+#[derive(Debug, Clone)]
 pub(super) struct Side {
     pub(super) index: usize,
     /// How far apart, in the units of the scale.
@@ -30,7 +31,8 @@ impl Bench<'_, '_> {
         let parts = fit.parts.iter().enumerate().skip(first);
         parts
             .flat_map(|(i, part)| {
-                self.sides(part, 1.0).into_iter().filter_map(move |side| self.slope(i, &fit.coefficients[i], &side))
+                let slope = |side: &Side| self.slope(i, &fit.coefficients[i], side);
+                self.both_sides(part).iter().filter_map(slope).collect::<Vec<_>>()
             })
             .collect()
     }
@@ -69,6 +71,11 @@ impl Bench<'_, '_> {
             (normal[(i, i)], right[i], ends[i]) = (1.0, end, true);
         }
         steps
+    }
+
+    /// A part to either side of where it stands; worked out once, since copies of a part stand in many sets.
+    pub(super) fn both_sides<'p>(&self, part: &'p Part) -> &'p [Side] {
+        part.sides.get_or_init(|| self.sides(part, 1.0))
     }
 
     /// A part with each of its parameters up and down by so many steps, all worked out together.

@@ -6,6 +6,7 @@
 
 use super::{Bench, Fit, Part, dot, project};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Shares of a step that are tried.
 const SHARES: [f64; 8] = [1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 0.05, 0.02];
@@ -46,6 +47,7 @@ impl Bench<'_, '_> {
         let part = |part: &Part| Part {
             fixed: part.fixed.as_deref().map(|fixed| sum(fixed).into()),
             columns: part.columns.iter().map(|column| sum(column)).collect(),
+            sides: Arc::default(),
             ..part.clone()
         };
         self.fit(set.parts.iter().map(part).collect())

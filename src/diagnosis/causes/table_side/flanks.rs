@@ -30,6 +30,8 @@ impl<const N: usize> Tables<'_, N> {
         let settled = (SWING_S / self.frame.columns.period_s).ceil() as usize;
         // Where the table of a rigid link is at a load.
         let behind = |l: usize, motor: f64, load: f64| motor - self.half[l].copysign(load) - load / self.stiffness[l];
+        // Near no load the flanks may part within the row.
+        let least = self.level.map(|level| 0.1 * level);
         let mut load = self.carried(rows.start);
         let mut state = State {
             position: [0.0; N],
@@ -39,15 +41,29 @@ impl<const N: usize> Tables<'_, N> {
             given: [[0.0; N]; 3],
             loose: [false; N],
         };
+        let mut any = false;
         for i in rows.start..rows.end - 1 {
             let next = self.carried(i + 1);
             let motor = self.frame.columns.position[i] * unit;
             let steady = i > rows.start && self.frame.direction[i] * self.frame.direction[i + 1] > 0.5;
-            let mut any = false;
+            let mut firm = [false; N];
+            let mut all_firm = steady;
             for l in 0..N {
-                // Near no load the flanks may part within the row.
-                let least = 0.1 * self.level[l];
-                let firm = steady && load[l].abs() > least && next[l].abs() > least && load[l] * next[l] > 0.0;
+                let both = smaller(load[l].abs(), next[l].abs());
+                firm[l] = steady & (both > least[l]) & (load[l] * next[l] > 0.0);
+                all_firm &= firm[l];
+            }
+            // In most rows of most tables this is all.
+            if all_firm && !any {
+                if let Some(lag) = lag.get_mut(i) {
+                    *lag = lanes(|l| (behind(l, motor, load[l]) - motor) / unit);
+                }
+                load = next;
+                continue;
+            }
+            any = false;
+            for l in 0..N {
+                let firm = firm[l];
                 let held = !state.loose[l] || state.together[l] >= settled && state.side[l] * load[l] > 0.0;
                 if firm && held || !state.loose[l] {
                     state.position[l] = behind(l, motor, load[l]);
