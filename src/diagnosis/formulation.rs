@@ -5,7 +5,7 @@
 
 use super::causes::presliding_friction::{BRISTLE, ELEMENTS, OF_ANY_EXPONENT};
 use super::causes::{Law, law};
-use super::fit::{Bench, Fit};
+use super::fit::{Bench, Fit, Part};
 use super::progress::{Stopped, Watch};
 use super::select::{LEAST_GAIN, LEAST_STRENGTH, Selection, is_physical, is_within_bounds, price, shrink};
 use super::uncertainty;
@@ -44,12 +44,12 @@ pub fn settled(bench: &Bench, found: Selection, watch: &Watch) -> Result<Selecti
     let [best, other] = others;
     // Beside what only stands in for it an exponent is not sure before all are refined.
     let much_less = price(&best) < price(&plain) - MUCH;
-    if much_less || price(&best) < price(&plain) && is_another(bench, &best, last) {
+    if much_less || price(&best) < price(&plain) && is_surely_another(bench, &best, last) {
         let alike = other.squares() <= WITHIN_REACH * best.squares();
         let refined = |fit: Fit| sound(bench, bench.refine(fit, 0, STEPS));
         let mut fits: Vec<Fit> = std::iter::once(best).chain(alike.then_some(other)).filter_map(refined).collect();
         fits.sort_by(|a, b| a.squares().total_cmp(&b.squares()));
-        let is_another = |fit: &Fit| place(fit).is_some_and(|at| is_another(bench, fit, at));
+        let is_another = |fit: &Fit| place(fit).is_some_and(|at| is_surely_another(bench, fit, at));
         if fits.first().is_some_and(|fit| price(fit) < price(&plain) && is_another(fit)) {
             let fit = fits.remove(0);
             fits.retain(|other| block_t(bench, other, &fit) < ALIKE);
@@ -63,6 +63,12 @@ pub fn settled(bench: &Bench, found: Selection, watch: &Watch) -> Result<Selecti
 /// Where friction that builds up is among the parts.
 fn place(fit: &Fit) -> Option<usize> {
     fit.parts.iter().position(|part| part.law.cause == Cause::PreslidingFriction)
+}
+
+/// Whether a part is friction that builds up in another way than a plain bristle, as was found here.
+#[must_use]
+pub fn is_another(part: &Part) -> bool {
+    std::ptr::eq(part.law, &OF_ANY_EXPONENT)
 }
 
 /// A fit, if need be without the parts that have left their bounds; `None` where that does not help.
@@ -91,7 +97,7 @@ fn without_substitutes(bench: &Bench, found: Selection, watch: &Watch) -> Result
 }
 
 /// Whether the exponent is surely not that of the plain bristle. Elements of this exponent go the same way after a full reversal.
-fn is_another(bench: &Bench, fit: &Fit, at: usize) -> bool {
+fn is_surely_another(bench: &Bench, fit: &Fit, at: usize) -> bool {
     match uncertainty::effects(bench, fit).swap_remove(at) {
         Some((Effect::PreslidingFriction { exponent, .. }, deviations)) => {
             (exponent - BRISTLE[0]).abs() > LEAST_STRENGTH * deviations[1]

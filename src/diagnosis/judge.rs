@@ -9,7 +9,6 @@
 use super::contact;
 use super::fit::{Bench, Fit};
 use super::foreign;
-use super::formulation;
 use super::frame::Columns;
 use super::gain::{self, Errors, Gain, HeldOut};
 use super::progress::{Stopped, Watch};
@@ -74,8 +73,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     ///
     /// # Errors
     /// [`Stopped`] when the watch's caller said so.
-    pub fn judge(&self, found: Selection) -> Result<Judged, Stopped> {
-        let mut found = formulation::settled(self.bench, found, self.watch)?;
+    pub fn judge(&self, mut found: Selection) -> Result<Judged, Stopped> {
         let Some(mut verdict) = self.explains(&found.fit) else { return Ok(self.nothing(&found)) };
         if let Some(goes) = foreign::stands_for(self.bench, &self.empty, &found.fit, self.watch)? {
             return Ok(Judged { refutation: Some(imitation(&found.fit, goes)), ..self.nothing(&found) });

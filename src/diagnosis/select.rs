@@ -11,6 +11,7 @@ use super::causes::Law;
 use super::causes::periods::{FEW, is_all_the_time, is_in_each_period};
 use super::fit::{Bench, Fit, Part, figure};
 use super::form;
+use super::formulation;
 use super::grids;
 use super::many::add;
 use super::progress::{Stopped, Watch};
@@ -165,7 +166,28 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     let start = if price(&open) < price(&start) { open } else { start };
     let fit = shrink(search.bench, start, search.watch)?;
     rivals.retain(|r| r.parts.len() == fit.parts.len() && !same_causes(r, &fit));
-    Ok(Selection { fit, rivals, alike: Vec::new() })
+    let plain = Selection { fit, rivals, alike: Vec::new() };
+    let found = formulation::settled(search.bench, plain, search.watch)?;
+    grown_on(search, found)
+}
+
+/// A selection with what is needed beside friction of another formulation than the search knows: what stood in for that
+/// formulation may have taken its place.
+fn grown_on(search: &Search, found: Selection) -> Result<Selection, Stopped> {
+    let mut fit = found.fit.clone();
+    if !fit.parts.iter().any(formulation::is_another) {
+        return Ok(found);
+    }
+    while fit.parts.len() < MOST {
+        let Some(next) = grow(search, std::slice::from_ref(&fit), (0.9, 0.9))?.into_iter().next() else { break };
+        fit = next;
+    }
+    if fit.parts.len() == found.fit.parts.len() {
+        return Ok(found);
+    }
+    let fit = shrink(search.bench, fit, search.watch)?;
+    // Another formulation, as uncertain as before, is compared beside the same causes.
+    Ok(if price(&fit) < price(&found.fit) { Selection { fit, alike: Vec::new(), ..found } } else { found })
 }
 
 /// What a set of causes costs: its figure, and its numbers.
