@@ -41,7 +41,7 @@ pub static LAWS: [Foreign; 19] = [
         somewhere: true,
         regressors: |frame, exponent| {
             let top = frame.top_speed();
-            vec![frame.judged_by(|i| frame.direction[i] * (frame.v[i].abs() / top).powf(exponent))]
+            vec![frame.judged_by(|i| frame.direction[i] * (frame.v[i].abs() / top).powf(LARGEST_EXPONENT * exponent))]
         },
     },
     Foreign {
@@ -170,6 +170,8 @@ pub static LAWS: [Foreign; 19] = [
     },
 ];
 
+/// Largest exponent of a root: with more it is hardly another law than viscous friction.
+const LARGEST_EXPONENT: f64 = 0.75;
 /// The shortest length, as a share of the stroke, and the shortest time, of the longest.
 const SHORTEST: f64 = 0.003;
 /// The longest time by which something comes late, s.
