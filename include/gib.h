@@ -2351,7 +2351,7 @@ typedef struct gib_homing_output {
      */
     uint32_t request_id;
     /**
-     * 1: position or drive cannot be trusted; take the torque off all motors and brake them, until the next start. What is
+     * 1: position, torque or drive cannot be trusted; take the torque off all motors and brake them, until the next start. What is
      * commanded no longer counts then; requests still do.
      */
     int32_t stop_drive;
@@ -5084,7 +5084,8 @@ int32_t gib_homing_start(struct gib_homing *handle,
  *
  * While `owns_motion` is 1, follow `target_position_mm` and report each motor's position and torque of the same
  * instant. When `request_id` changes, carry out `requests`, then report the number in `acknowledged_id`, and in
- * `torque_limit` the limit in force. Take the torque off the motors while `stop_drive` is 1.
+ * `torque_limit` the limit in force. Take the torque off the motors while `stop_drive` is 1: that is at once where the torque is more
+ * than the limit allows (GIB_ERR_TORQUE_BOUND), since a drive that does not keep to it would press on while it brakes.
  *
  * A fault is named in `message` in the cycle in which it is found. Then gib brakes, goes back from what is pressed on, and gives the
  * old torque limit back; while that goes on the status is GIB_BUSY, and only then the error. It takes at most, in seconds:

@@ -139,7 +139,8 @@ pub unsafe extern "C" fn gib_homing_start(handle: *mut GibHoming, config: *const
 ///
 /// While `owns_motion` is 1, follow `target_position_mm` and report each motor's position and torque of the same
 /// instant. When `request_id` changes, carry out `requests`, then report the number in `acknowledged_id`, and in
-/// `torque_limit` the limit in force. Take the torque off the motors while `stop_drive` is 1.
+/// `torque_limit` the limit in force. Take the torque off the motors while `stop_drive` is 1: that is at once where the torque is more
+/// than the limit allows (GIB_ERR_TORQUE_BOUND), since a drive that does not keep to it would press on while it brakes.
 ///
 /// A fault is named in `message` in the cycle in which it is found. Then gib brakes, goes back from what is pressed on, and gives the
 /// old torque limit back; while that goes on the status is GIB_BUSY, and only then the error. It takes at most, in seconds:

@@ -101,7 +101,7 @@ pub struct HomingOutput {
     /// Number of the present request: when it changes, carry out `requests`, then give the number back in
     /// `acknowledged_id`. 0: no request was made yet.
     pub request_id: u32,
-    /// 1: position or drive cannot be trusted; take the torque off all motors and brake them, until the next start. What is
+    /// 1: position, torque or drive cannot be trusted; take the torque off all motors and brake them, until the next start. What is
     /// commanded no longer counts then; requests still do.
     pub stop_drive: i32,
     /// Zero.

@@ -298,10 +298,12 @@ impl Homing {
         self.enter(Phase::Set, f64::from(self.plan.ack_timeout));
     }
 
-    /// Leaves for a fault: without a position to trust no move is safe, and a faulted drive makes none.
+    /// Leaves for a fault: without a position to trust no move is safe, a faulted drive makes none, and one that gives more torque than
+    /// it was told to is not to brake on what it presses on.
     #[cold]
     pub(super) fn leave(&mut self, fault: Fault) {
-        self.leave_by(fault, matches!(fault.code, GIB_ERR_HOMING_ENCODER | GIB_ERR_DRIVE_FAULT | GIB_ERR_NON_FINITE));
+        let blind = [GIB_ERR_HOMING_ENCODER, GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE, GIB_ERR_TORQUE_BOUND];
+        self.leave_by(fault, blind.contains(&fault.code));
     }
 
     /// The one door out: keeps the first fault, brakes, unloads, restores, fails. `blind`: without a move.
