@@ -2,7 +2,7 @@
 //! run can look like another inertia with another friction, with a small uncertainty.
 
 use super::blocks::{BLOCKS, Block};
-use super::fit::{HOLD, LEVEL, quantile};
+use super::fit::{HOLD, quantile};
 use super::robust::{Regression, Rows};
 use crate::error::{Fault, GIB_ERR_INERTIA_TORQUE};
 
@@ -13,8 +13,6 @@ pub fn doubt(blocks: &[Block], rows: &Rows, found: &Regression, both_ways: bool)
         .or_else(|| torn(found))
         .or_else(|| halves(rows, found))
         .or_else(|| paces(rows, found))
-        .or_else(|| corners(rows, found))
-        .or_else(|| if found.terms[0] > 0.0 { pushes(rows, found) } else { None })
 }
 
 fn fault(field: &'static str, value: f64, high: f64) -> Fault {
@@ -73,48 +71,6 @@ fn paces(rows: &Rows, found: &Regression) -> Option<Fault> {
     apart("paces_apart_ratio\0", (brisk.get(..n)?, gentle.get(..m)?), rows, found)
 }
 
-/// At the corner of a ramp the speed goes on, and friction with it, so that inertia alone changes the torque: a corner that
-/// clearly says another one than the fit tells of a torque that was dead, turned round or a load's for a part of the run.
-fn corners(rows: &Rows, found: &Regression) -> Option<Fault> {
-    const NEAR: usize = 4; // blocks on either side
-    const CLEAR: f64 = 6.0; // standard deviations
-    const MOST: f64 = 0.2; // of the inertia: ripple at a corner made it 0.16 in one of 2400 sound measurements
-    const FEW: usize = 8; // one corner in so many is an outlier, which moves no fit
-    let apart = LEVEL * quantile(rows.blocks, 0.98, |b| b.acceleration.abs());
-    let off = |b: &Block| rows.off(&found.terms, b);
-    let noise = rows.noise_of_neighbours(&found.terms, apart);
-    // The median: one wild block is none.
-    let middle = |blocks: &[Block], of: &dyn Fn(&Block) -> f64| {
-        0.5 * (quantile(blocks, 0.5, of) - quantile(blocks, 0.5, |block| -of(block)))
-    };
-    let (mut worst, mut corners, mut denied) = (0f64, 0, 0);
-    for (before, after) in rows.levels(apart).zip(rows.levels(apart).skip(1)) {
-        let before = before.get(before.len().saturating_sub(NEAR)..)?;
-        let after = after.get(..after.len().min(NEAR))?;
-        let steep = middle(after, &|b| b.acceleration) - middle(before, &|b| b.acceleration);
-        let step = middle(after, &off) - middle(before, &off);
-        let chance = noise * (1.0 / before.len() as f64 + 1.0 / after.len() as f64).sqrt();
-        if steep.abs() > 2.0 * apart {
-            let off = (step / steep / found.terms[0]).abs();
-            corners += 1;
-            if off > MOST && step.abs() > CLEAR * chance {
-                (worst, denied) = (worst.max(off), denied + 1);
-            }
-        }
-    }
-    (denied > 0 && FEW * denied >= corners).then(|| fault("corners_apart_ratio\0", worst, MOST))
-}
-
-/// A friction that clearly pushes, at the slowest or the fastest of the motion. At both it is known better than at a stand.
-fn pushes(rows: &Rows, found: &Regression) -> Option<Fault> {
-    const CLEAR: f64 = 4.0; // standard deviations
-    let [viscous, coulomb] = [found.terms[1], found.terms[2]];
-    let speeds = [0.02, 0.98].map(|share| quantile(rows.blocks, share, |b| b.speed.abs()).min(rows.trusted.speed));
-    let [slow, fast] = speeds.map(|speed| coulomb + viscous * speed);
-    let (least, chance) = (slow.min(fast), found.variance[2].max(0.0).sqrt());
-    (least < -CLEAR * chance).then(|| fault("friction_nm\0", least, f64::MAX))
-}
-
 /// Two parts of the motion that say clearly what the other denies.
 fn apart(field: &'static str, parts: (&[Block], &[Block]), rows: &Rows, found: &Regression) -> Option<Fault> {
     const CLEAR: f64 = 4.0; // standard deviations
@@ -146,7 +102,7 @@ mod tests {
             Block { torque: torque(i, truth), speed, acceleration }
         };
         let blocks: Vec<Block> = (0..160).map(block).collect();
-        let question = Question { sample_s: 1e-3, torque_step: 0.0, target: 0.05, own: [0.0; 2], process_step: 0 };
+        let question = Question { sample_s: 1e-3, target: 0.05, own: [0.0; 2], process_step: 0 };
         let (balance, verdict) = fit(&blocks, 20, &question);
         verdict.map(|()| balance.inertia.value).map_err(|fault| (fault.code, fault.field))
     }
@@ -180,42 +136,6 @@ mod tests {
         };
         assert_eq!(doubted(0.4), Some((GIB_ERR_INERTIA_TORQUE, "paces_apart_ratio\0")));
         assert_eq!(doubted(1.0), None, "one acceleration tells nothing");
-    }
-
-    /// Each of them alone could be another inertia with another friction; the corners of the ramps deny it.
-    #[test]
-    fn a_load_or_a_dead_torque_for_a_part_of_a_ramp_is_named_by_the_corners() {
-        let doubted = |torque: fn(usize, f64) -> f64| {
-            let block = |i: usize| {
-                let acceleration = [60.0, 0.0, -60.0, 0.0][i / 10 % 4];
-                let truth = 0.3 * acceleration + 4.0 + 0.05 * (i as f64 * 2.7).sin();
-                Block { torque: torque(i, truth), speed: 60.0 + (i % 10) as f64, acceleration }
-            };
-            let blocks: Vec<Block> = (0..160).map(block).collect();
-            let trusted = Limit::none(Terms::zeros());
-            let rows = Rows { blocks: &blocks, both_senses: false, noise: 0.0, trusted, suspected: None };
-            corners(&rows, &rows.fit().unwrap()).map(|fault| (fault.code, fault.field))
-        };
-        let named = Some((GIB_ERR_INERTIA_TORQUE, "corners_apart_ratio\0"));
-        assert_eq!(doubted(|_, truth| truth), None);
-        assert_eq!(doubted(|i, truth| if i < 85 { truth } else { 0.05 * (i as f64).sin() }), named, "dead");
-        assert_eq!(doubted(|i, truth| if i % 40 < 10 { truth + 10.0 } else { truth }), named, "a load on every way up");
-        assert_eq!(doubted(|i, truth| if i < 85 { truth } else { 0.6 * truth }), named, "changed");
-    }
-
-    #[test]
-    fn a_friction_that_pushes_is_named() {
-        let pushed = |nm: f64| {
-            let block = |i: usize| {
-                let acceleration = [60.0, 0.0, -60.0, 0.0][i / 10 % 4];
-                Block { torque: 0.3 * acceleration + nm + 0.05 * (i as f64 * 2.7).sin(), speed: 60.0, acceleration }
-            };
-            let blocks: Vec<Block> = (0..160).map(|i| Block { speed: 60.0 + (i % 10) as f64, ..block(i) }).collect();
-            let trusted = Limit::none(Terms::zeros());
-            let rows = Rows { blocks: &blocks, both_senses: false, noise: 0.0, trusted, suspected: None };
-            pushes(&rows, &rows.fit().unwrap()).is_some()
-        };
-        assert!(!pushed(4.0) && !pushed(0.0) && pushed(-4.0));
     }
 
     /// Wild blocks that come one by one are no reason for doubt.

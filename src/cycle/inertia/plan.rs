@@ -71,7 +71,7 @@ impl Plan {
             torque_nm: 1.0,
             torque_bound: f64::MAX,
             lag_limit: f64::MAX,
-            question: Question { sample_s: 1e-3, torque_step: 0.0, target: 0.05, own: [0.0; 2], process_step: 0 },
+            question: Question { sample_s: 1e-3, target: 0.05, own: [0.0; 2], process_step: 0 },
         }
     }
 
@@ -104,7 +104,6 @@ impl Plan {
             torque_bound: unit(bound),
             question: Question {
                 sample_s: cycle,
-                torque_step: 0.0,
                 target,
                 own: [own, own_uncertainty],
                 process_step: process_step as i32,
@@ -114,7 +113,7 @@ impl Plan {
         if listen {
             let shortest = cycle * 4.0 * BLOCKS as f64 / 8.0;
             plan.listen_cycles = cycles(in_range("listen_s\0", c.listen_s, shortest, 3600.0)?);
-            plan.block = (plan.listen_cycles / PLANNED).max((plan.listen_cycles / 128).min(16)).max(4);
+            plan.block = (plan.listen_cycles / PLANNED).max(4);
         } else {
             plan.add_ramps(c, takeup)?;
         }

@@ -126,34 +126,6 @@ impl Rows<'_> {
         Rows { noise: self.noise.min(most), ..self }
     }
 
-    /// What is left of a block's torque beside the balance `terms`.
-    #[must_use]
-    pub fn off(&self, terms: &Terms, block: &Block) -> f64 {
-        block.torque - terms.dot(&self.motion(block))
-    }
-
-    /// Stretches of two and more blocks that count and have one acceleration, within `apart`.
-    pub fn levels(&self, apart: f64) -> impl Iterator<Item = &[Block]> {
-        let near = move |a: &Block, b: &Block| (a.acceleration - b.acceleration).abs() <= apart;
-        let level = move |a: &Block, b: &Block| near(a, b) && self.counts(a) && self.counts(b);
-        self.blocks.chunk_by(level).filter(|blocks| blocks.len() > 1)
-    }
-
-    /// Standard deviation of a block's torque by what neighbours of one level differ: noise, whatever else is wrong. Where in a level
-    /// something happens, that counts once. 0 where there are none.
-    #[must_use]
-    pub fn noise_of_neighbours(&self, terms: &Terms, apart: f64) -> f64 {
-        let mut differences = [0.0; BLOCKS];
-        let mut n = 0;
-        let pairs = self.levels(apart).flat_map(|blocks| blocks.iter().zip(blocks.iter().skip(1)));
-        for ((a, b), place) in pairs.zip(differences.iter_mut()) {
-            *place = (self.off(terms, a) - self.off(terms, b)).abs();
-            n += 1;
-        }
-        let Some(seen) = differences.get_mut(..n).filter(|seen| !seen.is_empty()) else { return 0.0 };
-        STD_PER_MAD * *seen.select_nth_unstable_by(n / 2, f64::total_cmp).1 / core::f64::consts::SQRT_2
-    }
-
     fn unknowns(&self) -> usize {
         CONSTANT + usize::from(self.both_senses) + usize::from(self.suspected.is_some())
     }
