@@ -37,7 +37,7 @@ const LEAST_AT_START: f64 = SHOWN_AT_START * LEAST_GAIN;
 /// The same of a ripple of few periods, which explains some of anything that is slow along the stroke: a third of what is left.
 const LEAST_OF_FEW: f64 = 0.4;
 /// Least gain of a cause that has strayed beyond physical bounds for it to be put right: a third of what is left. What strays and
-/// explains less has found nothing of its own: of 71 springs that did none came back.
+/// explains less has found nothing of its own: of 71 springs that did one came back within bounds, and would not have been carried on.
 const LEAST_PUT_RIGHT: f64 = 0.4;
 /// What a further fitted number must gain where sets of causes compete.
 pub const NUMBER_PRICE: f64 = 0.003;
@@ -126,13 +126,13 @@ fn shelf(bench: &Bench, approach: &Approach, laws: &[&'static Law], watch: &Watc
     // Few starts at a time, so that all cores have work on the laws that take long.
     let starts: Vec<(&'static Law, Vec<Vec<f64>>)> = laws
         .iter()
-        .filter(|law| !law.starts_from_rest)
+        .filter(|law| !law.manner.starts_from_rest)
         .flat_map(|&law| bench.starts(law, &empty).chunks(AT_A_TIME).map(|c| (law, c.to_vec())).collect::<Vec<_>>())
         .collect();
     let laid = watch.each(&starts, (0.05, 0.15), "laying out what each cause would do", |(law, shapes)| {
         (
             law.cause,
-            if law.approached { approach.starts(law, shapes.clone()) } else { bench.parts(law, shapes.clone()) },
+            if law.manner.approached { approach.starts(law, shapes.clone()) } else { bench.parts(law, shapes.clone()) },
         )
     })?;
     let mut shelf = Shelf::new();
@@ -236,7 +236,7 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
     let mut open: Vec<(&Fit, &'static Law)> =
         beam.iter().flat_map(|set| laws.iter().filter(|law| may_join(set, law)).map(move |law| (set, *law))).collect();
     // What takes longest is begun first, lest a core have nothing left to do beside it.
-    open.sort_by_key(|(_, law)| !law.approached);
+    open.sort_by_key(|(_, law)| !law.manner.approached);
     let half = 0.5 * (from + to);
     let look = |&(set, law): &(_, _)| at_best_starts(search, set, law);
     let mut children: Vec<Child> =
@@ -253,7 +253,7 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
         *count += 1;
         *count <= TRIED && child.within_reach() < carried_on
     });
-    children.sort_by_key(|child| !child.part.law.simulated);
+    children.sort_by_key(|child| !child.part.law.manner.simulated);
     let refined = watch.each(&children, (half, to), "fitting causes", |Child { set, part, .. }| {
         let fit = refined(bench, set, part.clone());
         let fit = if is_physical(bench, &fit) { fit } else { put_right(bench, set, fit) };
@@ -290,7 +290,7 @@ fn put_right(bench: &Bench, set: &Fit, fit: Fit) -> Fit {
         return fit;
     }
     let Part { law, shape, .. } = &fit.parts[new];
-    let starts = bench.parts(law, (law.restarts)(shape)).into_iter();
+    let starts = bench.parts(law, (law.manner.restarts)(shape)).into_iter();
     let starts = starts.map(|part| (figure(&bench.joined(set, &part)), part));
     match starts.min_by(|a, b| a.0.total_cmp(&b.0)) {
         Some((_, part)) => refined(bench, set, part),
@@ -303,10 +303,10 @@ fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Vec<C
     let Search { bench, approach, shelf, .. } = search;
     let shelved = || shelf.get(&law.cause).map_or(&[][..], Vec::as_slice);
     let fresh: Vec<Part>;
-    let parts: &[Part] = if law.approached {
+    let parts: &[Part] = if law.manner.approached {
         fresh = bench.parts(law, approach.from(shelved(), set).into_iter().collect());
         &fresh
-    } else if law.starts_from_rest {
+    } else if law.manner.starts_from_rest {
         fresh = bench.parts(law, bench.starts(law, set));
         &fresh
     } else {
@@ -327,7 +327,7 @@ fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Vec<C
 fn may_join(set: &Fit, law: &Law) -> bool {
     let same = set.parts.iter().filter(|p| p.law.cause == law.cause).count();
     // What stands between motor and table is one thing: two simulations do not add up.
-    if law.simulated && set.parts.iter().any(|p| p.law.simulated) {
+    if law.manner.simulated && set.parts.iter().any(|p| p.law.manner.simulated) {
         return false;
     }
     // Two tight spots side by side imitate anything along the stroke.
@@ -344,7 +344,7 @@ pub fn is_physical(bench: &Bench, fit: &Fit) -> bool {
     one_of_each && (0..fit.parts.len()).all(|i| is_within_bounds(bench, fit, i))
 }
 
-/// Whether a part does.
+/// Whether the numbers of a part are within the physical bounds of its law.
 #[must_use]
 pub fn is_within_bounds(bench: &Bench, fit: &Fit, part: usize) -> bool {
     let Part { law, shape, .. } = &fit.parts[part];

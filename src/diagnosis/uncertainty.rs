@@ -74,7 +74,7 @@ pub fn strengths(bench: &Bench, fit: &Fit) -> Vec<f64> {
     let strength = |(i, part): (usize, &Part)| {
         let c = &fit.coefficients[i];
         let strength = if c.is_empty() { of_first(i, part) } else { of_coefficients(coefficient_at[i], c) };
-        if part.law.simulated { strength / misfit } else { strength }
+        if part.law.manner.simulated { strength / misfit } else { strength }
     };
     fit.parts.iter().enumerate().map(strength).collect()
 }
@@ -119,7 +119,7 @@ pub fn effects(bench: &Bench, fit: &Fit) -> Vec<Option<(Effect, Vec<f64>)>> {
                 let rate = scale.rate(part.shape[slope.index]);
                 differ(first_slope + s, step / rate, effect_of(&shape, &fit.coefficients[i]));
             }
-            let widened = if part.law.simulated { SIMULATED * misfit } else { 1.0 };
+            let widened = if part.law.manner.simulated { SIMULATED * misfit } else { 1.0 };
             let own = coefficient_at[i]..coefficient_at[i] + fit.coefficients[i].len();
             let deviation = |k: usize| {
                 let by_coefficients =

@@ -23,10 +23,7 @@ pub static LAW: Law = Law {
         let at = |w| [0.33, 0.52].map(|table| [0.5, 0.67, 0.84].map(|friction| vec![w, table, friction, 700.0]));
         widths.flat_map(|w| at(w).into_iter().flatten()).collect()
     },
-    restarts: NO_RESTARTS,
-    starts_from_rest: false,
-    approached: true,
-    simulated: true,
+    manner: Manner { approached: true, simulated: true, ..PLAIN },
     terms: |frame, shapes| {
         let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(shape)).collect();
         table_side::terms(frame, &effects)

@@ -7,10 +7,7 @@ pub static LAW: Law = Law {
     cause: Cause::CableForce,
     scales: &[Scale::Choice],
     starts: |_, _| vec![vec![0.0], vec![1.0]],
-    restarts: NO_RESTARTS,
-    starts_from_rest: false,
-    approached: false,
-    simulated: false,
+    manner: PLAIN,
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let line = Trace::torque(frame.kept.iter().map(|&i| frame.x[i]).collect());

@@ -18,10 +18,7 @@ pub static LAW: Law = Law {
         let count = (f64::max(8.0, 4.0 * h) / step).round() as i32;
         (-count..=count).filter(|i| *i != 0).map(|i| vec![f64::from(i) * step]).collect()
     },
-    restarts: NO_RESTARTS,
-    starts_from_rest: false,
-    approached: false,
-    simulated: false,
+    manner: PLAIN,
     terms: |frame, shapes| {
         let torque = frame.torque(0.0);
         each(shapes, |shape| {

@@ -38,17 +38,18 @@ pub static LAW: Law = Law {
         let own = swinging.chain(wound_up(frame, rest.table).filter(|own| *own > most));
         own.map(|own| vec![own / (1.0 - SHARE).sqrt(), SHARE, FRICTION_SHARE, 0.04]).collect()
     },
-    // How the table swings by itself is found sooner than what is whose: a fit that damps it until it hardly swings has found the one
-    // and strayed in the other.
-    restarts: |shape| {
-        let [resonance, share, ..] = shape else { return Vec::new() };
-        let own = resonance * (1.0 - share).sqrt();
-        let at = |share: f64| [0.5, 0.95].map(|friction| vec![own / (1.0 - share).sqrt(), share, friction, 0.04]);
-        [0.2, 0.45, 0.7, 0.85].into_iter().flat_map(at).collect()
+    manner: Manner {
+        // How the table swings by itself is found sooner than what is whose: a fit that damps it until it hardly swings has found the one
+        // and strayed in the other.
+        restarts: |shape| {
+            let [resonance, share, ..] = shape else { return Vec::new() };
+            let own = resonance * (1.0 - share).sqrt();
+            let at = |share: f64| [0.5, 0.95].map(|friction| vec![own / (1.0 - share).sqrt(), share, friction, 0.04]);
+            [0.2, 0.45, 0.7, 0.85].into_iter().flat_map(at).collect()
+        },
+        simulated: true,
+        ..PLAIN
     },
-    starts_from_rest: false,
-    approached: false,
-    simulated: true,
     terms: |frame, shapes| {
         let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(frame, shape)).collect();
         table_side::terms(frame, &effects)
@@ -85,7 +86,7 @@ fn effect(frame: &Frame, shape: &[f64]) -> Option<Effect> {
 
 /// The table's own frequency √(k/J₂), Hz, by how far the drive winds up under what it carries: of a spring too fast to be seen
 /// swinging, but soft enough for a scale on the table. `None` without one, or where the table does not lag.
-fn wound_up(frame: &Frame, table: &[f64]) -> impl Iterator<Item = f64> {
+fn wound_up(frame: &Frame, table: &[f64]) -> Option<f64> {
     let (b, unit) = (&frame.belief, frame.unit);
     let inertia = SHARE * b.inertia;
     let carried = frame.judged_by(|i| {
@@ -93,5 +94,5 @@ fn wound_up(frame: &Frame, table: &[f64]) -> impl Iterator<Item = f64> {
     });
     let per_torque = -unit * dot(&carried, table) / dot(&carried, &carried).max(1e-300);
     let own = (1.0 / (per_torque * inertia)).sqrt() / TAU;
-    (own.is_finite() && own < FASTEST_HZ * (1.0 - SHARE).sqrt()).then_some(own).into_iter()
+    (own.is_finite() && own < FASTEST_HZ * (1.0 - SHARE).sqrt()).then_some(own)
 }

@@ -8,10 +8,7 @@ pub static LAW: Law = Law {
     cause: Cause::ExternalVibration,
     scales: &[Scale::Linear(3.0, 1e9, 0.02)],
     starts: |frame, rest| periods::along_time(frame, rest.torque),
-    restarts: NO_RESTARTS,
-    starts_from_rest: true,
-    approached: false,
-    simulated: false,
+    manner: Manner { starts_from_rest: true, ..PLAIN },
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let per_second = shape[0] / duration(frame);

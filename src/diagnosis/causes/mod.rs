@@ -91,14 +91,8 @@ pub struct Rest<'a> {
     pub table: &'a [f64],
 }
 
-/// One cause.
-pub struct Law {
-    /// Its name.
-    pub cause: Cause,
-    /// How each non-linear parameter is searched.
-    pub scales: &'static [Scale],
-    /// Starts of the non-linear parameters; none where this recording cannot show the cause.
-    pub starts: fn(&Frame, &Rest) -> Vec<Vec<f64>>,
+/// How a law is looked for.
+pub struct Manner {
     /// Starts anew from where a fit has strayed beyond the bounds, by what it has found all the same.
     pub restarts: fn(&[f64]) -> Vec<Vec<f64>>,
     /// Whether the starts depend on what is left.
@@ -107,6 +101,21 @@ pub struct Law {
     pub approached: bool,
     /// Whether the trace is a simulation of what happens between the rows.
     pub simulated: bool,
+}
+
+/// That of a law that does not stray, with a trace that is worked out row by row, from starts that the recording gives.
+const PLAIN: Manner = Manner { restarts: |_| Vec::new(), starts_from_rest: false, approached: false, simulated: false };
+
+/// One cause.
+pub struct Law {
+    /// Its name.
+    pub cause: Cause,
+    /// How each non-linear parameter is searched.
+    pub scales: &'static [Scale],
+    /// Starts of the non-linear parameters; none where this recording cannot show the cause.
+    pub starts: fn(&Frame, &Rest) -> Vec<Vec<f64>>,
+    /// How it is looked for.
+    pub manner: Manner,
     /// The traces at given non-linear parameters, one for each set of them.
     pub terms: fn(&Frame, &[Vec<f64>]) -> Vec<Term>,
     /// The effect that parameters and coefficients stand for; `None` beyond physical bounds.
@@ -116,9 +125,6 @@ pub struct Law {
     /// What it says to a machinist.
     pub sentence: fn(&Effect, &Axis) -> String,
 }
-
-/// Of a law that does not stray.
-const NO_RESTARTS: fn(&[f64]) -> Vec<Vec<f64>> = |_| Vec::new();
 
 impl Law {
     /// Whether a parameter is one of form, and as usual: it is not fitted then.

@@ -25,10 +25,7 @@ pub static LAW: Law = Law {
         let lasting = (1..10).flat_map(|i| [0.0, 1.0].map(|end| vec![end, 0.1 * f64::from(i), STRETCH]));
         bells.chain(lasting).collect()
     },
-    restarts: NO_RESTARTS,
-    starts_from_rest: false,
-    approached: false,
-    simulated: false,
+    manner: PLAIN,
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let (centre, width) = place(frame, shape);

@@ -28,10 +28,7 @@ const fn with_exponent(scales: &'static [Scale]) -> Law {
             let of = |[n, kind]: [f64; 2]| widths.clone().map(move |d| vec![d, n, kind]);
             of(BRISTLE).chain(of(ELEMENTS).step_by(2)).collect()
         },
-        restarts: NO_RESTARTS,
-        starts_from_rest: false,
-        approached: false,
-        simulated: false,
+        manner: PLAIN,
         terms: |frame, shapes| {
             each(shapes, |shape| {
                 let [state, rate] = build_up(frame, shape[0] * 1e-3, shape[1], is_of_elements(shape[2]));

@@ -7,10 +7,7 @@ pub static LAW: Law = Law {
     cause: Cause::ScrewPeriodicError,
     scales: &[Scale::Linear(1.0, 1e6, 0.02)],
     starts: |frame, rest| if rest.table.is_empty() { Vec::new() } else { periods::along_stroke(frame, rest.table) },
-    restarts: NO_RESTARTS,
-    starts_from_rest: true,
-    approached: false,
-    simulated: false,
+    manner: Manner { starts_from_rest: true, ..PLAIN },
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let (sine, cosine) = periods::waves(frame, shape[0]);

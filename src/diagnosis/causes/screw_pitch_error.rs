@@ -7,10 +7,7 @@ pub static LAW: Law = Law {
     cause: Cause::ScrewPitchError,
     scales: &[],
     starts: |_, rest| if rest.table.is_empty() { Vec::new() } else { vec![Vec::new()] },
-    restarts: NO_RESTARTS,
-    starts_from_rest: false,
-    approached: false,
-    simulated: false,
+    manner: PLAIN,
     terms: |frame, shapes| {
         each(shapes, |_| Term {
             fixed: None,

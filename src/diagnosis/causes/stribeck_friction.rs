@@ -14,10 +14,7 @@ pub static LAW: Law = Law {
         let top = frame.top_speed();
         log_spaced(2e-3 * top, 0.4 * top, 12).map(|v| vec![v, GAUSSIAN]).collect()
     },
-    restarts: NO_RESTARTS,
-    starts_from_rest: false,
-    approached: false,
-    simulated: false,
+    manner: PLAIN,
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let per = 1.0 / shape[0];

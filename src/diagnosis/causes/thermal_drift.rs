@@ -7,10 +7,7 @@ pub static LAW: Law = Law {
     cause: Cause::ThermalDrift,
     scales: &[Scale::Log(0.02, 3.0)],
     starts: |_, _| log_spaced(0.04, 2.0, 9).map(|share| vec![share]).collect(),
-    restarts: NO_RESTARTS,
-    starts_from_rest: false,
-    approached: false,
-    simulated: false,
+    manner: PLAIN,
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let (begin, per) = (frame.columns.time_s[0], 1.0 / (shape[0] * duration(frame)));

@@ -8,10 +8,7 @@ pub static LAW: Law = Law {
     cause: Cause::TorqueSaturation,
     scales: &[Scale::Log(0.25, 0.98)],
     starts: |_, _| (0..9).map(|i| vec![0.3 + 0.075 * f64::from(i)]).collect(),
-    restarts: NO_RESTARTS,
-    starts_from_rest: false,
-    approached: false,
-    simulated: false,
+    manner: PLAIN,
     terms: |frame, shapes| {
         each(shapes, |shape| {
             let limit = shape[0] * peak(frame);

@@ -7,10 +7,7 @@ pub static LAW: Law = Law {
     cause: Cause::ViscousFrictionMismatch,
     scales: &[],
     starts: one_start,
-    restarts: NO_RESTARTS,
-    starts_from_rest: false,
-    approached: false,
-    simulated: false,
+    manner: PLAIN,
     terms: |frame, shapes| each(shapes, |_| Term::torque(frame.speed.clone())),
     effect: |frame, _, c| {
         let change = *c.first()?;
