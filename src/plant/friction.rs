@@ -9,7 +9,7 @@
 /// By what law friction builds up over a displacement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BristleLaw {
-    /// How the stiffness falls on the way to the level, see [`left_after`] and [`Elements`].
+    /// How the stiffness falls on the way to the level, see [`Curve`] and [`Elements`].
     pub exponent: f64,
     /// Whether it is that of [`Elements`], not of a bristle.
     pub of_elements: bool,
@@ -28,8 +28,8 @@ impl Default for BristleLaw {
 pub struct Friction {
     /// σ: torque per displacement of the bristle; zero for pure Coulomb friction.
     pub stiffness: f64,
-    /// How the stiffness falls on the way to the level, see [`left_after`]; 1 is Dahl's bristle.
-    pub exponent: f64,
+    /// How that falls on the way to the level.
+    curve: Curve,
     /// Damping of the bristle over its stiffness, s.
     pub micro_damping_s: f64,
     /// Torque of the bristle now, without its damping.
@@ -44,7 +44,7 @@ impl Friction {
     pub fn new(stiffness: f64, law: BristleLaw) -> Self {
         let BristleLaw { exponent, of_elements, micro_damping_s } = law;
         let elements = of_elements.then(|| Elements::new(exponent));
-        Self { stiffness, exponent, micro_damping_s, force: 0.0, elements }
+        Self { stiffness, curve: Curve::new(exponent), micro_damping_s, force: 0.0, elements }
     }
 
     /// A bristle at rest; with a stiffness of zero pure Coulomb friction.
@@ -67,9 +67,16 @@ impl Friction {
             self.force = 0.0;
             return impulse / mass;
         }
-        if self.exponent != 1.0 || self.elements.is_some() {
+        if self.elements.is_some() {
             let next;
-            (*self, next) = self.stepped(mass, impulse, h, level);
+            (*self, next) = self.slipped(mass, impulse, h, level);
+            return next;
+        }
+        if self.curve.exponent != 1.0 {
+            let next;
+            let Self { stiffness, micro_damping_s, force, .. } = *self;
+            let bristle = Bristle { stiffness, micro_damping_s, force };
+            (self.curve, self.force, next) = self.curve.stepped(bristle, mass, impulse, h, level);
             return next;
         }
         // F′ = (F + σ·h·v′)·L/d, with the bristle slipping at the speed before the step; its damping adds τ·(F′ − F)/h.
@@ -80,10 +87,10 @@ impl Friction {
         next
     }
 
-    /// The same of any exponent: the slope is that before the step, and the step is then taken exactly. By value, so that
-    /// those of pure Coulomb friction and of Dahl's bristle can stay in registers.
+    /// The same of elements: those that stick before the step are the slope. By value, so that those of pure Coulomb friction and
+    /// of bristles can stay in registers.
     #[inline(never)]
-    fn stepped(mut self, mass: f64, impulse: f64, h: f64, level: f64) -> (Self, f64) {
+    fn slipped(mut self, mass: f64, impulse: f64, h: f64, level: f64) -> (Self, f64) {
         let free = impulse - h * self.force;
         let next = free / (mass + h * (h + self.micro_damping_s) * self.slope(free, level));
         self.moved(h * next, level);
@@ -91,12 +98,12 @@ impl Friction {
     }
 
     /// dF/dq towards the side that `towards` says.
-    fn slope(&self, towards: f64, level: f64) -> f64 {
+    fn slope(&mut self, towards: f64, level: f64) -> f64 {
         if let Some(elements) = &self.elements {
             return self.stiffness * elements.sticking(towards, level / self.stiffness);
         }
-        let left = (1.0 - self.force * towards.signum() / level).clamp(0.0, 2.0);
-        self.stiffness * left.powf(self.exponent)
+        let left = (0.5 - 0.5 * self.force * towards.signum() / level).min(1.0);
+        if left < NOTHING { 0.0 } else { self.stiffness * 2.0 * left * self.curve.rate(left) }
     }
 
     /// Torque after the bristle was moved by `dq`, at a given level, exactly.
@@ -107,7 +114,7 @@ impl Friction {
             self.force = self.stiffness * elements.moved(dq, level / self.stiffness);
         } else {
             let end = level.copysign(dq);
-            let left = left_after(0.5 - 0.5 * self.force / end, self.stiffness * dq.abs() / level, self.exponent);
+            let left = self.curve.left_after(0.5 - 0.5 * self.force / end, self.stiffness * dq.abs() / level);
             self.force = end * (1.0 - 2.0 * left);
         }
         self.force
@@ -115,26 +122,99 @@ impl Friction {
 
     /// What its damping adds at speed `w`.
     #[must_use]
-    pub fn damped(&self, w: f64, level: f64) -> f64 {
+    pub fn damped(&mut self, w: f64, level: f64) -> f64 {
         if self.micro_damping_s > 0.0 && level > 0.0 { self.micro_damping_s * w * self.slope(w, level) } else { 0.0 }
     }
 }
 
-/// Share of the way between the levels that a bristle has left, after a displacement in units of level over stiffness:
-/// dF/dq = σ·(1 − F·sign(q̇)/L)ⁿ.
-#[inline]
-#[must_use]
-pub fn left_after(left: f64, by: f64, exponent: f64) -> f64 {
-    // Nothing of it is left but a rounding, as in most rows of a recording.
-    if left < 1e-14 {
-        return 0.0;
+/// How the stiffness of a bristle falls on the way to the level L: dF/dq = σ·(1 − F·sign(q̇)/L)ⁿ. Of the way between the levels it
+/// has a share y left, and dy/dq = −y·r·σ/L with the rate r = 2ⁿ⁻¹·yⁿ⁻¹.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Curve {
+    exponent: f64,
+    /// 2ⁿ⁻¹.
+    whole: f64,
+    /// A share whose rate is known, and that rate: powers are dear, and shares follow each other closely.
+    known: [f64; 2],
+}
+
+/// A share of the way that is nothing but a rounding, as in most rows of a recording.
+const NOTHING: f64 = 1e-14;
+/// Up to here five terms of a series are as exact as numbers are.
+const CLOSE: f64 = 4e-3;
+/// 1/k; a product is ready before a quotient.
+const PER: [f64; 6] = [f64::INFINITY, 1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0];
+
+impl Curve {
+    /// The curve of an exponent; 1 is Dahl's.
+    #[must_use]
+    pub fn new(exponent: f64) -> Self {
+        Self { exponent, whole: 2f64.powf(exponent - 1.0), known: [0.0; 2] }
     }
-    if exponent == 1.0 {
-        return left * (-by).exp();
+
+    /// Share of the way that is left after a displacement in units of level over stiffness.
+    #[inline]
+    #[must_use]
+    pub fn left_after(&mut self, left: f64, by: f64) -> f64 {
+        if left < NOTHING {
+            return 0.0;
+        }
+        if self.exponent == 1.0 {
+            return left * (-by).exp();
+        }
+        let rate = self.rate(left);
+        self.after(left, by * rate)
     }
-    let power = 1.0 - exponent;
-    let rest = left.powf(power) - power * by * 2f64.powf(-power);
-    if rest > 0.0 { rest.powf(1.0 / power) } else { 0.0 }
+
+    #[inline(always)]
+    fn rate(&mut self, left: f64) -> f64 {
+        let [at, rate] = self.known;
+        let (d, m) = ((left - at) / at, self.exponent - 1.0);
+        if d.abs() < CLOSE {
+            let term = |k: usize| d * PER[k] * (m + 1.0 - k as f64);
+            return rate * (1.0 + term(1) * (1.0 + term(2) * (1.0 + term(3) * (1.0 + term(4) * (1.0 + term(5))))));
+        }
+        self.known = [left, self.whole * left.powf(m)];
+        self.known[1]
+    }
+
+    /// What is left of `left` after a displacement times the rate there.
+    #[inline(always)]
+    fn after(&self, left: f64, by: f64) -> f64 {
+        let n = self.exponent;
+        if by < CLOSE {
+            // Of y′ = −yⁿ from 1 on.
+            let term = |k: usize| by * PER[k] * (k as f64 * (n - 1.0) + 2.0 - n);
+            return left * (1.0 - term(1) * (1.0 - term(2) * (1.0 - term(3) * (1.0 - term(4) * (1.0 - term(5))))));
+        }
+        let rest = 1.0 - (1.0 - n) * by;
+        if rest > 0.0 { left * rest.powf(1.0 / (1.0 - n)) } else { 0.0 }
+    }
+
+    /// The bristle's torque and the speed of a mass after a step of [`Friction::step`]: the slope is that before the step, and the
+    /// step is then taken exactly.
+    #[inline(never)]
+    fn stepped(mut self, bristle: Bristle, mass: f64, impulse: f64, h: f64, level: f64) -> (Self, f64, f64) {
+        let Bristle { stiffness, micro_damping_s, force } = bristle;
+        let free = impulse - h * force;
+        let end = level.copysign(free);
+        let left = (0.5 - 0.5 * force / end).min(1.0);
+        if left < NOTHING {
+            return (self, end, free / mass);
+        }
+        let rate = self.rate(left);
+        let next = free / (mass + h * (h + micro_damping_s) * stiffness * 2.0 * left * rate);
+        let left = self.after(left, stiffness * (h * next).abs() / level * rate);
+        (self, end * (1.0 - 2.0 * left), next)
+    }
+}
+
+/// What a bristle is beside its curve.
+#[derive(Clone, Copy)]
+struct Bristle {
+    stiffness: f64,
+    micro_damping_s: f64,
+    force: f64,
 }
 
 /// Elements side by side, each a spring that slips beyond its own displacement (generalized Maxwell slip): how far each is

@@ -3,7 +3,7 @@
 //! own damping adds τ·ż (LuGre, Canudas de Wit et al. 1995). Driven by the measured position, so no speed has to be known.
 
 use super::*;
-use crate::plant::friction::{Elements, left_after};
+use crate::plant::friction::{Curve, Elements};
 
 /// The law while causes are sought. Traces: z − sign(v), whose coefficient is the friction level that builds up, and ż, whose
 /// coefficient is that times τ. Parameters: d in thousandths of the load's unit, n, and 0 for a bristle or 1 for elements.
@@ -65,6 +65,7 @@ fn is_of_elements(kind: f64) -> bool {
 fn build_up(frame: &Frame, displacement: f64, exponent: f64, of_elements: bool) -> [Vec<f64>; 2] {
     let x = &frame.columns.position;
     let (mut state, mut rate) = (vec![0.0; x.len()], vec![0.0; x.len()]);
+    let mut curve = Curve::new(exponent);
     let at_rest = of_elements.then(|| Elements::new(exponent));
     for s in &frame.columns.stretches {
         let (mut z, mut elements) = (0.0, at_rest);
@@ -76,7 +77,7 @@ fn build_up(frame: &Frame, displacement: f64, exponent: f64, of_elements: bool) 
                 z = if slip { z } else { elements.moved(step, 1.0) };
             } else if step != 0.0 {
                 let end = step.signum();
-                z = end * (1.0 - 2.0 * left_after(0.5 - 0.5 * z * end, step.abs(), exponent));
+                z = end * (1.0 - 2.0 * curve.left_after(0.5 - 0.5 * z * end, step.abs()));
             }
             state[i] = z;
         }
