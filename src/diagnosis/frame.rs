@@ -9,7 +9,7 @@
 
 use super::filter::{LowPass, convolve, norm, of_three};
 use super::grids;
-use super::many::{decay, product, widest};
+use super::many::{decay, product, to_the_power, widest};
 use super::rows::{direction_of, doubtful_rows, judged_rows, resting_rows};
 use super::sampling::{NUMEROV, Sampling};
 use crate::machine::{Axis, Belief, Effect};
@@ -319,8 +319,13 @@ impl<'a> Frame<'a> {
     /// [`Frame::fading`] with a power of a distance.
     #[must_use]
     pub fn fading_by(&self, column: &[f64], exponent: f64, distance: impl Fn(f64) -> f64) -> Vec<f64> {
-        let (square, half) = (|value| distance(value).powi(2), 0.5 * exponent);
-        if half == 1.0 { self.fading(column, square) } else { self.fading(column, |value| square(value).powf(half)) }
+        let square = |value: f64| distance(value).powi(2);
+        if exponent == 2.0 {
+            return self.fading(column, square);
+        }
+        let mut powers: Vec<f64> = column.iter().map(|value| square(*value)).collect();
+        to_the_power(&mut powers, 0.5 * exponent);
+        self.fading(&powers, |power| power)
     }
 
     /// The measured torque at the judged rows, if the column is late by `late_s` beyond what is known. What a delay has

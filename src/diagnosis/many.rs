@@ -1,7 +1,7 @@
 //! Arithmetic on many numbers at once. A diagnosis is little but sums over rows, and a processor that takes four at a time is
 //! done in a third of the time.
 
-use std::f64::consts::{LN_2, LOG2_E, TAU};
+use std::f64::consts::{FRAC_1_SQRT_2, LN_2, LOG2_E, TAU};
 
 /// Runs a loop with the widest registers that this processor has. Each number comes out the same on every processor: only how
 /// many are worked out at once differs.
@@ -74,15 +74,52 @@ pub fn sine_cosine(turns: f64) -> (f64, f64) {
 /// e^−x for x from 0 on, to 1e-9; the library's are exact to the last bit and take several times as long.
 #[inline(always)]
 pub fn decay(x: f64) -> f64 {
+    two_to(-LOG2_E * if x < 700.0 { x } else { 700.0 })
+}
+
+/// A power of each, from 0 on, to 1e-8; of what is less than 1e-300 that of 1e-300.
+pub fn to_the_power(values: &mut [f64], exponent: f64) {
+    widest(
+        #[inline(always)]
+        || {
+            for value in values.iter_mut() {
+                let y = exponent * binary_logarithm(*value);
+                let below = if y < 1000.0 { y } else { 1000.0 };
+                *value = two_to(if below > -1000.0 { below } else { -1000.0 });
+            }
+        },
+    );
+}
+
+/// 2^y for y within ±1020.
+#[inline(always)]
+fn two_to(y: f64) -> f64 {
     /// Added to a number, it leaves the nearest whole one in the last bits.
     const WHOLE: f64 = 6_755_399_441_055_744.0;
-    // e^−x = 2ⁿ·eʳ with r within half of ln 2.
-    let y = -if x < 700.0 { x } else { 700.0 };
-    let n = y * LOG2_E + WHOLE;
+    // 2ⁿ·eʳ with r within half of ln 2.
+    let n = y + WHOLE;
     let power = f64::from_bits((n.to_bits() << 52).wrapping_add(1.0f64.to_bits()));
-    let r = y - (n - WHOLE) * LN_2;
+    let r = (y - (n - WHOLE)) * LN_2;
     let tail = 1.0 / 120.0 + r * (1.0 / 720.0 + r * (1.0 / 5040.0 + r / 40_320.0));
     power * (1.0 + r * (1.0 + r * (0.5 + r * (1.0 / 6.0 + r * (1.0 / 24.0 + r * tail)))))
+}
+
+/// log₂ x of a number from 1e-300 on, to 1e-10.
+#[inline(always)]
+fn binary_logarithm(x: f64) -> f64 {
+    /// 2⁵², in whose last bits whole numbers stand.
+    const WHOLE: f64 = 4_503_599_627_370_496.0;
+    const ROOT_OF_HALF: u64 = FRAC_1_SQRT_2.to_bits();
+    let bits = (if x > 1e-300 { x } else { 1e-300 }).to_bits();
+    // x = 2ᵏ·m with m from √½ to √2.
+    let biased = (bits + (1.0f64.to_bits() - ROOT_OF_HALF)) >> 52;
+    let m = f64::from_bits(bits.wrapping_sub(biased.wrapping_sub(1023) << 52));
+    let k = f64::from_bits(biased | WHOLE.to_bits()) - (WHOLE + 1023.0);
+    // ln m = 2·artanh s.
+    let s = (m - 1.0) / (m + 1.0);
+    let q = s * s;
+    let tail = 1.0 / 7.0 + q * (1.0 / 9.0 + q * (1.0 / 11.0 + q / 13.0));
+    k + 2.0 * LOG2_E * s * (1.0 + q * (1.0 / 3.0 + q * (1.0 / 5.0 + q * tail)))
 }
 
 #[cfg(test)]
@@ -105,6 +142,19 @@ mod tests {
             assert!((decay(x) / (-x).exp() - 1.0).abs() < 1e-9, "{x}");
         }
         assert!(decay(1e9) < 1e-300 && decay(f64::INFINITY) < 1e-300 && decay(0.0) == 1.0);
+    }
+
+    #[test]
+    fn powers_are_those_of_the_library() {
+        for exponent in [0.03, 0.2, 0.7, 1.3, 4.0, 30.0] {
+            let values: Vec<f64> = (-400..400).map(|i| (f64::from(i) * 0.05).exp()).collect();
+            let mut powers = values.clone();
+            to_the_power(&mut powers, exponent);
+            assert!(powers.iter().zip(&values).all(|(p, x)| (p / x.powf(exponent) - 1.0).abs() < 1e-8), "{exponent}");
+        }
+        let mut ends = [0.0, 1e-310, 1.0, 1e200, f64::INFINITY];
+        to_the_power(&mut ends, 5.0);
+        assert!(ends[0] < 1e-299 && ends[1] < 1e-299 && ends[2] == 1.0 && ends[3] > 1e300 && ends[4] > 1e300);
     }
 
     #[test]

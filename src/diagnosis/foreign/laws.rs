@@ -3,6 +3,7 @@
 //! along straight lines.
 
 use crate::diagnosis::frame::Frame;
+use crate::diagnosis::many::to_the_power;
 
 /// Places along the stroke, over the speed or among the lengths and times at which something may begin or lie.
 pub const PLACES: usize = 24;
@@ -40,8 +41,10 @@ pub static LAWS: [Foreign; 19] = [
         numbers: 2,
         somewhere: true,
         regressors: |frame, exponent| {
-            let top = frame.top_speed();
-            vec![frame.judged_by(|i| frame.direction[i] * (frame.v[i].abs() / top).powf(LARGEST_EXPONENT * exponent))]
+            let per = 1.0 / frame.top_speed();
+            let mut roots: Vec<f64> = frame.v.iter().map(|v| v.abs() * per).collect();
+            to_the_power(&mut roots, LARGEST_EXPONENT * exponent);
+            vec![frame.judged_by(|i| frame.direction[i] * roots[i])]
         },
     },
     Foreign {
