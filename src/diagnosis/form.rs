@@ -11,9 +11,10 @@ const LEAST_OF_FORM: f64 = 0.25 * LEAST_GAIN;
 /// How far off the usual form a search for another begins.
 const BESIDE: f64 = 1.02;
 
-/// A set with some of its parts of the form that the rows show, refined so often.
+/// A set with some of its parts of the form that the rows show; these parts and those after them are refined so often.
 #[must_use]
 pub fn settled(bench: &Bench, mut fit: Fit, parts: Range<usize>, most: usize) -> Fit {
+    let first = parts.start;
     for part in parts {
         for (index, scale) in fit.parts[part].law.scales.iter().enumerate() {
             let Scale::Form(.., usual) = *scale else { continue };
@@ -22,7 +23,7 @@ pub fn settled(bench: &Bench, mut fit: Fit, parts: Range<usize>, most: usize) ->
                 continue;
             }
             let other = of_form(bench, &fit, (part, index), if is_usual { usual * BESIDE } else { usual });
-            let other = bench.refine_roughly(other, 0, most);
+            let other = bench.refine_roughly(other, first, most);
             let (as_usual, free) = if is_usual { (&fit, &other) } else { (&other, &fit) };
             let shown = price(free) < price(as_usual) - LEAST_OF_FORM && is_within_bounds(bench, free, part);
             if shown == is_usual {
@@ -34,7 +35,8 @@ pub fn settled(bench: &Bench, mut fit: Fit, parts: Range<usize>, most: usize) ->
 }
 
 /// Whether no form of a law can gain anything: what is left is the noise floor.
-fn leaves_nothing(bench: &Bench, fit: &Fit) -> bool {
+#[must_use]
+pub fn leaves_nothing(bench: &Bench, fit: &Fit) -> bool {
     let above: f64 = bench.channels(&fit.residual).iter().map(|square| square.max(1.0).ln()).sum();
     above < LEAST_OF_FORM
 }

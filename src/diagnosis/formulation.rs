@@ -17,10 +17,38 @@ const OWN_STEPS: usize = 5;
 const STEPS: usize = 8;
 /// Squares over the least up to which a fit by itself is refined with the others.
 const WITHIN_REACH: f64 = 1.3;
+/// Displacements over that of the other kind at which a kind is tried.
+const APART: [f64; 3] = [0.7, 1.0, 1.4];
 /// Gain from which on another formulation is refined in any case: what a cause must gain.
 const MUCH: f64 = LEAST_GAIN;
 /// Below this mean over scatter of what one fit gains over another in each block they are alike.
 const ALIKE: f64 = 2.0;
+
+/// What is said while it is done.
+const STAGE: &str = "comparing how friction builds up";
+
+/// A set with that of the two kinds that the search knows which suits it: friction that seems to build up by elements while it is the
+/// only cause is often a bristle beside others.
+#[must_use]
+pub fn suited(bench: &Bench, fit: Fit, most: usize) -> Fit {
+    let Some(at) = place(&fit).filter(|at| fit.parts.len() > 1 && !is_another(&fit.parts[*at])) else { return fit };
+    let Part { law, shape, .. } = &fit.parts[at];
+    let kind = if shape[1..] == BRISTLE { ELEMENTS } else { BRISTLE };
+    let stiffnesses = APART.map(|apart| vec![shape[0] * apart, kind[0], kind[1]]);
+    let with = |own: Part| {
+        let mut parts = fit.parts.clone();
+        parts[at] = own;
+        bench.fit(parts)
+    };
+    let others = bench.parts(law, stiffnesses.into()).into_iter().map(with);
+    match others.min_by(|a, b| a.squares().total_cmp(&b.squares())) {
+        Some(other) if other.squares() < WITHIN_REACH * fit.squares() => {
+            let other = bench.refine_roughly(other, 0, most);
+            if other.squares() < fit.squares() { other } else { fit }
+        }
+        _ => fit,
+    }
+}
 
 /// The selection with friction that builds up by the law that it follows, and without what only stood in for that.
 ///
@@ -38,16 +66,20 @@ pub fn settled(bench: &Bench, found: Selection, watch: &Watch) -> Result<Selecti
         bench.refine_roughly(bench.fit(parts.iter().cloned().chain(own).collect()), last, OWN_STEPS)
     };
     let is_plain = sought.shape[1..] == BRISTLE;
-    let plain = if is_plain { found.fit.clone() } else { with(law(Cause::PreslidingFriction), BRISTLE) };
-    let mut others = [BRISTLE, ELEMENTS].map(|kind| with(&OF_ANY_EXPONENT, kind));
-    others.sort_by(|a, b| a.squares().total_cmp(&b.squares()));
-    let [best, other] = others;
+    let any = &OF_ANY_EXPONENT;
+    let kinds = [(any, BRISTLE), (any, ELEMENTS), (law(Cause::PreslidingFriction), BRISTLE)];
+    let tried = &kinds[..if is_plain { 2 } else { 3 }];
+    let mut fits = watch.each(tried, (0.9, 0.9), STAGE, |&(law, kind)| with(law, kind))?;
+    let plain = if is_plain { found.fit.clone() } else { fits.remove(2) };
+    fits.sort_by(|a, b| a.squares().total_cmp(&b.squares()));
+    let Ok([best, other]) = <[Fit; 2]>::try_from(fits) else { return Ok(found) };
     // Beside what only stands in for it an exponent is not sure before all are refined.
     let much_less = price(&best) < price(&plain) - MUCH;
     if much_less || price(&best) < price(&plain) && is_surely_another(bench, &best, last) {
         let alike = other.squares() <= WITHIN_REACH * best.squares();
-        let refined = |fit: Fit| sound(bench, bench.refine(fit, 0, STEPS));
-        let mut fits: Vec<Fit> = std::iter::once(best).chain(alike.then_some(other)).filter_map(refined).collect();
+        let near: Vec<Fit> = std::iter::once(best).chain(alike.then_some(other)).collect();
+        let refined = |fit: &Fit| sound(bench, bench.refine(fit.clone(), 0, STEPS));
+        let mut fits: Vec<Fit> = watch.each(&near, (0.9, 0.9), STAGE, refined)?.into_iter().flatten().collect();
         fits.sort_by(|a, b| a.squares().total_cmp(&b.squares()));
         let is_another = |fit: &Fit| place(fit).is_some_and(|at| is_surely_another(bench, fit, at));
         if fits.first().is_some_and(|fit| price(fit) < price(&plain) && is_another(fit)) {

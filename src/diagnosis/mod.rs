@@ -8,6 +8,7 @@
 //! T_measured(t + delay) = J·α + Tv·ω + Tc·sign(ω) + T0 + Σ causes, in the drive's own unit (N·m, or N for linear).
 
 mod approach;
+mod astray;
 mod belief;
 mod blocks;
 pub mod causes;

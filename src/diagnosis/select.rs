@@ -6,6 +6,7 @@
 //! fitted without a block and judged on it.
 
 use super::approach::Approach;
+use super::astray;
 use super::blocks;
 use super::causes::Law;
 use super::causes::periods::{FEW, is_all_the_time, is_in_each_period};
@@ -36,9 +37,6 @@ const SHOWN_AT_START: f64 = 0.25;
 const LEAST_AT_START: f64 = SHOWN_AT_START * LEAST_GAIN;
 /// The same of a ripple of few periods, which explains some of anything that is slow along the stroke: a third of what is left.
 const LEAST_OF_FEW: f64 = 0.4;
-/// Least gain of a cause that has strayed beyond physical bounds for it to be put right: a third of what is left. What strays and
-/// explains less has found nothing of its own: of 71 springs that did one came back within bounds, and would not have been carried on.
-const LEAST_PUT_RIGHT: f64 = 0.4;
 /// What a further fitted number must gain where sets of causes compete.
 pub const NUMBER_PRICE: f64 = 0.003;
 
@@ -254,48 +252,49 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
         *count <= TRIED && child.within_reach() < carried_on
     });
     children.sort_by_key(|child| !child.part.law.manner.simulated);
-    let refined = watch.each(&children, (half, to), "fitting causes", |Child { set, part, .. }| {
-        let fit = refined(bench, set, part.clone());
-        let fit = if is_physical(bench, &fit) { fit } else { put_right(bench, set, fit) };
-        (is_physical(bench, &fit) && once_only(bench, &fit).is_none() && price(&fit) < price(set) - 0.5 * LEAST_GAIN)
-            .then_some(fit)
+    let stage = "fitting causes";
+    let fits = watch.each(&children, (half, to), stage, |Child { set, part, .. }| refined(bench, set, part.clone()))?;
+    let (within, strayed): (Vec<_>, Vec<_>) =
+        fits.into_iter().zip(&children).partition(|(fit, _)| is_physical(bench, fit));
+    let best = within.iter().map(|(fit, _)| fit).min_by(|a, b| price(a).total_cmp(&price(b)));
+    let right = watch.each(&strayed, (to, to), stage, |(fit, child)| {
+        let right = if astray::matters(bench, fit, best) { astray::put_right(bench, child.set, fit) } else { None };
+        right.filter(|fit| is_physical(bench, fit))
     })?;
-    let mut grown: Vec<Fit> = refined.into_iter().flatten().collect();
-    grown.sort_by(|a, b| price(a).total_cmp(&price(b)));
+    let right = right.into_iter().zip(&strayed).filter_map(|(fit, (_, child))| Some((fit?, *child)));
+    let worth = |(fit, child): &(Fit, &Child)| {
+        price(fit) < price(child.set) - 0.5 * LEAST_GAIN && once_only(bench, fit).is_none()
+    };
+    let mut grown: Vec<Fit> = within.into_iter().chain(right).filter(worth).map(|(fit, _)| fit).collect();
+    sort_by_price(&mut grown);
+    // Of what form a law is matters of the sets that are carried on.
+    let carried_on = grown.len().min(BEAM);
+    let formed = watch.each(&grown[..carried_on], (to, to), stage, |fit| of_form(bench, fit))?;
+    grown.splice(..carried_on, formed);
+    sort_by_price(&mut grown);
     Ok(grown)
 }
 
+fn sort_by_price(fits: &mut [Fit]) {
+    fits.sort_by(|a, b| price(a).total_cmp(&price(b)));
+}
+
+/// A set with its last cause of the form that the rows show.
+fn of_form(bench: &Bench, fit: &Fit) -> Fit {
+    let last = fit.parts.len().saturating_sub(1);
+    let formed = form::settled(bench, fit.clone(), last..fit.parts.len(), 6);
+    if is_physical(bench, &formed) { formed } else { fit.clone() }
+}
+
 /// A set with a cause more, first fitted by itself, then with the others.
-fn refined(bench: &Bench, set: &Fit, part: Part) -> Fit {
+#[must_use]
+pub fn refined(bench: &Bench, set: &Fit, part: Part) -> Fit {
     let mut parts = set.parts.clone();
     parts.push(part);
     let count = set.parts.len();
     let fit = bench.refine_roughly(bench.fit(parts), count, 6);
     let fit = bench.refine_roughly(fit, 0, if count == 0 { 4 } else { 2 });
-    form::settled(bench, fit, count..count + 1, 6)
-}
-
-/// What a set with a cause more becomes that was fitted beyond physical bounds: without those of before that the new one has made
-/// needless, or with the new one from other starts where it is itself what has strayed.
-fn put_right(bench: &Bench, set: &Fit, fit: Fit) -> Fit {
-    let sound: Vec<usize> = (0..fit.parts.len()).filter(|i| is_within_bounds(bench, &fit, *i)).collect();
-    let Some(new) = fit.parts.len().checked_sub(1) else { return fit };
-    if sound.len() > new {
-        return fit; // all are, but a ripple is there twice
-    }
-    if sound.contains(&new) {
-        return bench.refine_roughly(bench.fit(sound.iter().map(|i| fit.parts[*i].clone()).collect()), 0, 2);
-    }
-    if price(&fit) > price(set) - LEAST_PUT_RIGHT {
-        return fit;
-    }
-    let Part { law, shape, .. } = &fit.parts[new];
-    let starts = bench.parts(law, (law.manner.restarts)(shape)).into_iter();
-    let starts = starts.map(|part| (figure(&bench.joined(set, &part)), part));
-    match starts.min_by(|a, b| a.0.total_cmp(&b.0)) {
-        Some((_, part)) => refined(bench, set, part),
-        None => fit,
-    }
+    formulation::suited(bench, fit, 2)
 }
 
 /// A law where it explains most of what a set leaves, if that is worth refining; a ripple of few periods beside a fine one.
