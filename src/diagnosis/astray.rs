@@ -1,18 +1,17 @@
 //! What becomes of sets of causes that were fitted beyond physical bounds.
 
 use super::fit::{Bench, Fit, Part, figure};
-use super::form::leaves_nothing;
 use super::select::{is_within_bounds, price, refined};
 
 /// Least gain of a cause that has strayed beyond physical bounds for it to be put right: a third of what is left. What strays and
 /// explains less has found nothing of its own: of 71 springs that did one came back within bounds, and would not have been carried on.
 const LEAST_PUT_RIGHT: f64 = 0.4;
 
-/// Whether a set that has strayed matters beside the best that has not: beside one that leaves nothing only what leaves about as
-/// little is of interest.
+/// Whether a set that has strayed matters beside the best that has not: bounds only take away, so that one that explains less
+/// without them does not come first within them.
 #[must_use]
-pub fn matters(bench: &Bench, strayed: &Fit, best: Option<&Fit>) -> bool {
-    best.is_none_or(|best| !leaves_nothing(bench, best) || price(strayed) < price(best) + LEAST_PUT_RIGHT)
+pub fn matters(strayed: &Fit, best: Option<&Fit>) -> bool {
+    best.is_none_or(|best| price(strayed) < price(best))
 }
 
 /// What a set with a cause more becomes that was fitted beyond physical bounds: without those of before that the new one has made

@@ -35,8 +35,7 @@ pub fn settled(bench: &Bench, mut fit: Fit, parts: Range<usize>, most: usize) ->
 }
 
 /// Whether no form of a law can gain anything: what is left is the noise floor.
-#[must_use]
-pub fn leaves_nothing(bench: &Bench, fit: &Fit) -> bool {
+fn leaves_nothing(bench: &Bench, fit: &Fit) -> bool {
     let above: f64 = bench.channels(&fit.residual).iter().map(|square| square.max(1.0).ln()).sum();
     above < LEAST_OF_FORM
 }

@@ -258,7 +258,7 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
         fits.into_iter().zip(&children).partition(|(fit, _)| is_physical(bench, fit));
     let best = within.iter().map(|(fit, _)| fit).min_by(|a, b| price(a).total_cmp(&price(b)));
     let right = watch.each(&strayed, (to, to), stage, |(fit, child)| {
-        let right = if astray::matters(bench, fit, best) { astray::put_right(bench, child.set, fit) } else { None };
+        let right = if astray::matters(fit, best) { astray::put_right(bench, child.set, fit) } else { None };
         right.filter(|fit| is_physical(bench, fit))
     })?;
     let right = right.into_iter().zip(&strayed).filter_map(|(fit, (_, child))| Some((fit?, *child)));
