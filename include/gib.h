@@ -1018,7 +1018,7 @@
 
 /**
  * Limits as published: the power at the mean speed only, nothing for friction and cutting. The motor is asked for up
- * to (1 + amplitude) times its power. For comparison.
+ * to (1 + amplitude) times its power. For comparison. The bounds of speed are kept.
  */
 #define GIB_SPEED_VARIATION_PUBLISHED 1
 

@@ -7,7 +7,7 @@ pub const GIB_SPEED_VARIATION_SINE: i32 = 1;
 /// Limits keep torque and power within the motor's at every moment (default).
 pub const GIB_SPEED_VARIATION_EXACT: i32 = 0;
 /// Limits as published: the power at the mean speed only, nothing for friction and cutting. The motor is asked for up
-/// to (1 + amplitude) times its power. For comparison.
+/// to (1 + amplitude) times its power. For comparison. The bounds of speed are kept.
 pub const GIB_SPEED_VARIATION_PUBLISHED: i32 = 1;
 
 /// What to vary, by which motor. Zero in a field means its default; fields marked "required" have none.

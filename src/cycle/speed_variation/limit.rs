@@ -83,7 +83,7 @@ impl Motor {
             let out = mean <= self.speeds[0] || mean >= self.speeds[1];
             return (0.0, if out { Limit::Speed } else { Limit::Nothing });
         }
-        let by_speed = (self.speeds[1] / mean - 1.0).min(1.0 - self.speeds[0] / mean);
+        let by_speed = self.by_speed(mean);
         let (by_power, by_torque) = match wave {
             Wave::Triangle => self.triangle(mean, period),
             Wave::Sine => self.sine(mean, period),
@@ -92,6 +92,12 @@ impl Motor {
         let torque = (by_torque, Limit::Torque);
         let least = if torque.0 < power.0 { torque } else { power };
         if by_speed <= least.0 { (by_speed, Limit::Speed) } else { least }
+    }
+
+    /// Amplitude at which the lowest or the highest speed allowed is met; not below 0.
+    #[must_use]
+    pub fn by_speed(&self, mean: f64) -> f64 {
+        (self.speeds[1] / mean - 1.0).min(1.0 - self.speeds[0] / mean).max(0.0)
     }
 
     fn triangle(&self, mean: f64, period: f64) -> (f64, f64) {

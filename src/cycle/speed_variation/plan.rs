@@ -153,7 +153,9 @@ impl Plan {
     #[must_use]
     pub fn possible(&self, motor: &Motor, mean: f64, period: f64) -> (f64, Limit) {
         if self.published {
-            return (motor.published_amplitude(mean, period).min(MOST), Limit::Power);
+            // The print knows no bound of speed either, but that is the machine's.
+            let (amplitude, by_speed) = (motor.published_amplitude(mean, period).min(MOST), motor.by_speed(mean));
+            return if by_speed < amplitude { (by_speed, Limit::Speed) } else { (amplitude, Limit::Power) };
         }
         let (amplitude, limit) = motor.amplitude(self.wave, mean, period);
         if amplitude > MOST { (MOST, Limit::Speed) } else { (amplitude, limit) }
@@ -198,8 +200,11 @@ impl Plan {
     /// # Errors
     /// `GIB_ERR_CONFIG` or `GIB_ERR_SPEED_VARIATION_SPEED` with the input's name, value and range.
     pub fn wanted(&self, speed_rpm: f64, amplitude: f64, period: f64, cutting: f64) -> Result<[f64; 4], Fault> {
+        // A bound that is asked for exactly must not be lost by rounding.
+        const ROUNDING: f64 = 1e-12;
         let [low, high] = self.motor.speeds.map(rpm_from_rad_s);
-        let speed = in_range("speed_rpm\0", speed_rpm * self.sense, low.max(1e-3), high)
+        let (low, high) = (low.max(1e-3) * (1.0 - ROUNDING), high * (1.0 + ROUNDING));
+        let speed = in_range("speed_rpm\0", speed_rpm * self.sense, low, high)
             .map_err(|fault| Fault { code: GIB_ERR_SPEED_VARIATION_SPEED, ..fault })?;
         // Less than the least is the least: on the way to nothing it must not become a number too small for a cycle.
         let amplitude = match in_range("amplitude_ratio\0", amplitude, 0.0, MOST)? {
@@ -254,6 +259,26 @@ mod tests {
         assert_eq!(field(SpeedVariationConfig { speed_rpm: 0.0, ..valid() }), "speed_rpm\0");
         assert_eq!(field(SpeedVariationConfig { amplitude_ratio: 0.0, ..valid() }), "amplitude_ratio\0");
         assert_eq!(field(SpeedVariationConfig { period_s: 0.001, ..valid() }), "period_s\0");
+    }
+
+    #[test]
+    fn the_print_keeps_to_the_bounds_of_speed() {
+        let config = SpeedVariationConfig { formula: GIB_SPEED_VARIATION_PUBLISHED, speed_max_rpm: 1200.0, ..valid() };
+        let fault = Plan::to_start(&config).unwrap_err();
+        assert!(fault.code == GIB_ERR_SPEED_VARIATION_SPEED && (fault.high - 0.2).abs() < 1e-9, "{fault:?}");
+        assert!(Plan::to_start(&SpeedVariationConfig { amplitude_ratio: fault.high, ..config }).is_ok());
+    }
+
+    /// To rad/s and back a bound may come out a rounding error beside itself.
+    #[test]
+    fn a_speed_at_its_bound_is_within_it() {
+        for i in 0..1000 {
+            let (low, high) = (200.0 + 0.1 * f64::from(i), 900.0 + 0.3 * f64::from(i));
+            let config = SpeedVariationConfig { speed_min_rpm: low, speed_rpm: 600.0, speed_max_rpm: high, ..valid() };
+            let wanted = |speed| Plan::new(&config).unwrap().wanted(speed, 0.1, 2.0, 0.0);
+            assert!(wanted(low).is_ok() && wanted(high).is_ok(), "{low} {high}");
+            assert!(wanted(low * (1.0 - 1e-9)).is_err() && wanted(high * (1.0 + 1e-9)).is_err());
+        }
     }
 
     #[test]

@@ -1,0 +1,109 @@
+/*
+ * Speed variation against somebody who means it ill: random motors, configurations and troubles under a power meter, see
+ * variation_adversary.h. Most runs are the same every time; some are fresh, with a seed that is printed. Only those of one seed:
+ * test_variation_adversary SEED [RUNS]. A run by itself: SEED as printed for it, 1.
+ *
+ * Of 80000 fresh runs one broke a law, so that those of a test do once in four thousand times.
+ */
+#include "variation_adversary.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include <cmocka.h>
+
+enum { KNOWN_SEED = 20260400, KNOWN_RUNS = 2000, FRESH_RUNS = 20 };
+
+static uint64_t fresh_seed;
+static int fresh_runs = FRESH_RUNS;
+static variation_adversary a;
+
+static void describe(uint64_t seed)
+{
+    print_message("seed %llu: %s, run %d, cycle %d (ended from %d), cycle %g ms: %s\n", (unsigned long long)seed, a.broken, a.run + 1,
+                  a.broken_at, a.named, 1e3 * a.config.cycle_s, gib_status_text(a.out.status));
+    for (int i = 0; i < a.troubles; i++) {
+        const variation_trouble *t = &a.trouble[i];
+        print_message("    %s in cycle %d for %d%s\n", variation_trouble_names[t->kind], t->at, t->lasts, t->begun ? "" : ": not met");
+    }
+}
+
+static void every_law_holds(uint64_t seed, int runs)
+{
+    int broken = 0, met = 0, well = 0;
+    double worst = 0.0;
+    for (int i = 0; i < runs; i++) {
+        variation_adversary_init(&a, seed + (uint64_t)i, VARIATION_NO_MISTAKE);
+        variation_adversary_run(&a);
+        for (int k = 0; k < a.troubles; k++) {
+            met += a.trouble[k].begun;
+        }
+        well += a.status[0] == GIB_DONE;
+        worst = a.worst > worst ? a.worst : worst;
+        broken += a.broken != NULL;
+        if (a.broken) {
+            describe(seed + (uint64_t)i);
+        }
+    }
+    print_message("seed %llu: %d runs of two variations, %d troubles met, %d ended well, %d broke a law; the meter took %.0f %% of what it may exceed\n",
+                  (unsigned long long)seed, runs, met, well, broken, 100.0 * worst);
+    assert_int_equal(broken, 0);
+    assert_true(met >= runs && well >= runs / 10);
+}
+
+static void every_law_holds_in_known_runs(void **state)
+{
+    (void)state;
+    every_law_holds(KNOWN_SEED, KNOWN_RUNS);
+}
+
+static void every_law_holds_in_fresh_runs(void **state)
+{
+    (void)state;
+    every_law_holds(fresh_seed, fresh_runs);
+}
+
+/* The laws can fail: each of these mistakes, put in on purpose, breaks the one that is about it. */
+static void mistakes_break_laws(void **state)
+{
+    (void)state;
+    static const char *const LAWS[VARIATION_MISTAKES] = {
+        [VARIATION_JUMPS] = "a feed-forward that is what the change takes",
+        [VARIATION_TOO_FAST] = "a feed-forward that is what the change takes",
+        [VARIATION_NO_COMMAND] = "a command that is a number",
+        [VARIATION_SAYS_NOTHING] = "a fault in its cycle",
+        [VARIATION_NEVER_ENDS] = "an end in time",
+        [VARIATION_TOO_MUCH] = "a feed-forward that is what the change takes",
+        [VARIATION_TOO_STEEP] = "no more power than the motor has",
+        [VARIATION_TIMID] = "a swing as asked for",
+        [VARIATION_REMEMBERS] = "the same inputs, the same outputs",
+    };
+    for (int m = VARIATION_NO_MISTAKE + 1; m < VARIATION_MISTAKES; m++) {
+        int broken = 0, met = 0;
+        for (int i = 0; i < 100; i++) {
+            variation_adversary_init(&a, KNOWN_SEED + (uint64_t)i, (variation_mistake)m);
+            variation_adversary_run(&a);
+            broken += a.broken != NULL;
+            met += a.broken && strcmp(a.broken, LAWS[m]) == 0;
+        }
+        print_message("%s: %d of 100 runs of a mistake broke it, %d broke any\n", LAWS[m], met, broken);
+        assert_true(met >= 5);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    const struct CMUnitTest all[] = {
+        cmocka_unit_test(every_law_holds_in_known_runs),
+        cmocka_unit_test(mistakes_break_laws),
+        cmocka_unit_test(every_law_holds_in_fresh_runs),
+    };
+    const struct CMUnitTest asked[] = {cmocka_unit_test(every_law_holds_in_fresh_runs)};
+    fresh_seed = argc > 1 ? strtoull(argv[1], NULL, 10) : (uint64_t)time(NULL) * 1000u;
+    fresh_runs = argc > 2 ? atoi(argv[2]) : fresh_runs;
+    return argc > 1 ? cmocka_run_group_tests(asked, NULL, NULL) : cmocka_run_group_tests(all, NULL, NULL);
+}
