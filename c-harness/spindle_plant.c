@@ -79,6 +79,9 @@ spindle_reading spindle_sense(spindle *s)
     if (uniform(&s->random) < s->c.outlier_ratio) {
         r.torque += (uniform(&s->random) - 0.5) * 8.0 * s->c.torque_limit_nm;
     }
+    if (s->c.torque_grid_nm > 0.0) {
+        r.torque = s->c.torque_grid_nm * floor(r.torque / s->c.torque_grid_nm + 0.5);
+    }
     if (s->c.torque_constant_nm_a > 0.0) {
         r.torque /= s->c.torque_constant_nm_a;
     }

@@ -25,6 +25,7 @@ typedef struct {
     double torque_noise_nm; /* standard deviation of one torque sample */
     double outlier_ratio;   /* share of torque samples that are wild */
     double speed_grid_rpm;
+    double torque_grid_nm;
     double counts_per_turn; /* the speed is the difference of an encoder's counts over a cycle; 0: it is not */
     double torque_constant_nm_a; /* the drive reports a current; 0: it reports torque */
     int torque_late_cycles;      /* the torque reported is this old, up to SPINDLE_LATEST */

@@ -135,8 +135,7 @@ pub fn measure(recording: &Recording, options: &Options) -> Result<Found, Record
         takeup: (options.takeup_s / period).round() as u32,
     };
     let runs = recording.runs(&[speed_column, torque_column]);
-    let question =
-        Question { sample_s: period, target: options.target, own: options.own, process_step: options.process_step };
+    let (target, own, process_step) = (options.target, options.own, options.process_step);
     let mut length = (recording.rows() * 5 / (BLOCKS * 4)).max(SHORTEST);
     loop {
         let mut gather = Gather::new(gate, length as u32, period, torque_nm);
@@ -146,6 +145,8 @@ pub fn measure(recording: &Recording, options: &Options) -> Result<Found, Record
                 gather.add(speed, torque);
             }
         }
+        let torque_step = gather.torque_step();
+        let question = Question { sample_s: period, torque_step, target, own, process_step };
         let (report, verdict) = InertiaReport::of(gather.blocks(), length as u32, &question);
         let refused = verdict.err().map(Refusal);
         // Lost in the noise of the speed: blocks of twice the length calm the acceleration by 2√2.

@@ -74,6 +74,7 @@ pub struct Gather {
     /// What makes Σψ·x a mean in rad/s and N·m, and Σu·ω an acceleration.
     mean: [f64; 2],
     slope: f64,
+    torque_nm: f64,
     last_torque: f64,
     used: usize,
     blocks: [Block; BLOCKS],
@@ -165,6 +166,7 @@ impl Gather {
             length,
             mean: [0.5 * rad_s / weights, 0.5 * torque_nm / weights],
             slope: rad_s / (weights * cycle_s),
+            torque_nm,
             last_torque: 0.0,
             used: 0,
             blocks: [Block::default(); BLOCKS],
@@ -175,6 +177,13 @@ impl Gather {
     #[must_use]
     pub fn blocks(&self) -> &[Block] {
         self.blocks.get(..self.used).unwrap_or(&[])
+    }
+
+    /// Smallest step seen between two torques, N·m; 0 where none was.
+    #[must_use]
+    pub fn torque_step(&self) -> f64 {
+        let step = self.calm.grid.0[1];
+        if step < f64::MAX { step * self.torque_nm } else { 0.0 }
     }
 
     /// Samples in a block.

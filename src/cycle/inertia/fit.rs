@@ -7,6 +7,7 @@
 use super::blocks::{BLOCKS, Block};
 use super::doubt::{doubt, stuck};
 use super::robust::{Limit, Regression, Rows, Terms};
+use super::stretches::rests_on_one;
 use crate::error::{Fault, GIB_ERR_INERTIA_EXCITATION, GIB_ERR_INERTIA_FEW, GIB_ERR_INERTIA_SIGN};
 
 /// What the fit needs to know beside the blocks.
@@ -14,6 +15,8 @@ use crate::error::{Fault, GIB_ERR_INERTIA_EXCITATION, GIB_ERR_INERTIA_FEW, GIB_E
 pub struct Question {
     /// Time between samples, s.
     pub sample_s: f64,
+    /// Smallest step of the torque, N·m; 0: not known.
+    pub torque_step: f64,
     /// Expanded uncertainty wanted, as a share of the inertia.
     pub target: f64,
     /// The machine's own inertia and its expanded uncertainty, kg·m².
@@ -96,6 +99,8 @@ const STEPS: usize = 32;
 const LOWEST: f64 = 0.35;
 /// An acceleration below this share of the largest is a hold or a corner, not a ramp.
 pub(super) const HOLD: f64 = 0.3;
+/// Neighbours whose accelerations differ by less than this share of the largest are of one level.
+pub(super) const LEVEL: f64 = 0.2;
 /// Share of a block's variance that the parabola's weights add to that of a plain mean (6/5).
 const PARABOLA: f64 = 1.2;
 
@@ -115,7 +120,8 @@ pub fn fit(blocks: &[Block], length: u32, question: &Question) -> (Balance, Resu
     let mut kept = [Block::default(); BLOCKS];
     let count = without_lone(blocks, &mut kept);
     let whole = rows(kept.get(..count).unwrap_or(&[])).with_noise_that_torque_denies();
-    let (rows, weakening, saturation) = trustworthy(whole);
+    let rounding = rounding(&whole, length, question);
+    let (rows, weakening, saturation) = trustworthy(whole, rounding.sqrt());
     balance.weakening = weakening;
     balance.saturation = saturation;
     balance.left_out = blocks.len() - rows.blocks.iter().filter(|b| rows.counts(b)).count();
@@ -124,9 +130,10 @@ pub fn fit(blocks: &[Block], length: u32, question: &Question) -> (Balance, Resu
         let excitation = Fault::of(GIB_ERR_INERTIA_EXCITATION);
         return (balance, Err(stuck(blocks).unwrap_or(excitation)));
     };
-    fill(&mut balance, &found);
+    let steep = quantile(blocks, 0.98, |b| b.acceleration.abs());
+    fill(&mut balance, &found, rounding, steep, &rests_on_one(&rows, &found));
     balance.ramp = ramp(&rows, &balance, length, question);
-    let verdict = match doubt(blocks, &rows, &found, balance.both_ways) {
+    let verdict = match doubt(blocks, &rows, &found, &balance) {
         Some(fault) => Err(fault),
         None => judge(&balance, &found),
     };
@@ -210,12 +217,15 @@ fn acceleration_noise(blocks: &[Block]) -> f64 {
 }
 
 /// Leaves out what field weakening and saturation spoil, one after the other, where they are clear beyond chance.
-fn trustworthy(whole: Rows) -> (Rows, f64, f64) {
+/// `rounding`: standard deviation of a level of the torque by its steps; what that explains is no limit.
+fn trustworthy(whole: Rows, rounding: f64) -> (Rows, f64, f64) {
+    const ROUNDED: f64 = 2.0;
     const MARGIN: f64 = 0.94; // two of the thresholds tried
     let mut rows = whole;
     let (mut weakening, mut saturation) = (0.0, 0.0);
+    let rounded = rows.fit().is_some_and(|plain| plain.scatter <= ROUNDED * rounding);
     for _ in 0..2 {
-        let Some(limit) = limit(&rows) else { break };
+        let Some(limit) = limit(&rows).filter(|_| !rounded) else { break };
         if limit.speed < f64::MAX {
             weakening = limit.speed;
             rows.trusted.speed = MARGIN * weakening;
@@ -325,13 +335,32 @@ fn few_stretches(share: f64) -> f64 {
     (1.96 + 2.9694 * share + 0.416 * share.powi(2) - 0.5324 * share.powi(3)) / 1.96
 }
 
-fn fill(balance: &mut Balance, found: &Regression) {
+/// Variance (N²m²) by which the steps of a coarse torque are off as long as a level of it lasts: in all its samples alike, but
+/// for what noise spreads over the steps (Gaussian dither; Wannamaker 2000). A step of a tenth of the torque and more was a wild
+/// sample.
+fn rounding(rows: &Rows, length: u32, question: &Question) -> f64 {
+    const WILD: f64 = 0.1;
+    let strongest = quantile(rows.blocks, 0.98, |b| b.torque.abs());
+    let step = if question.torque_step < WILD * strongest { question.torque_step } else { 0.0 };
+    let apart = LEVEL * quantile(rows.blocks, 0.98, |b| b.acceleration.abs());
+    let Some(found) = rows.fit().filter(|_| step > 0.0) else { return 0.0 };
+    let noise = rows.noise_of_neighbours(&found.terms, apart) * (f64::from(length) / PARABOLA).sqrt();
+    let left = (-2.0 * (core::f64::consts::PI * noise / step).powi(2)).exp();
+    (step * left).powi(2) / 12.0
+}
+
+/// `rounding`: variance of a level of the torque. Inertia and friction rest on two such at least, up and down. `lone`: what rests
+/// on one stretch of the run.
+fn fill(balance: &mut Balance, found: &Regression, rounding: f64, steep: f64, lone: &Terms) {
     let t = student(found.used as f64 - 4.0) * few_stretches(found.lag_share);
-    let value = |i: usize| Value { value: found.terms[i], uncertainty: t * found.variance[i].max(0.0).sqrt() };
-    balance.inertia = value(0);
-    balance.viscous = value(1);
-    balance.coulomb = value(2);
-    balance.constant = value(3);
+    let value = |i: usize, also: f64| Value {
+        value: found.terms[i],
+        uncertainty: t * (found.variance[i].max(0.0) + also).sqrt() + lone[i],
+    };
+    balance.inertia = value(0, 0.5 * rounding / (steep * steep).max(f64::MIN_POSITIVE));
+    balance.viscous = value(1, 0.0);
+    balance.coulomb = value(2, 0.5 * rounding);
+    balance.constant = value(3, 0.0);
     balance.scatter = found.scatter;
     balance.used = found.used;
     balance.dropped = found.dropped;
@@ -368,7 +397,8 @@ fn blind_ramp(blocks: &[Block]) -> Ramp {
 mod tests {
     use super::*;
 
-    const QUESTION: Question = Question { sample_s: 1e-3, target: 0.05, own: [0.0; 2], process_step: 0 };
+    const QUESTION: Question =
+        Question { sample_s: 1e-3, torque_step: 0.0, target: 0.05, own: [0.0; 2], process_step: 0 };
 
     /// Trapezoids with J 0.3, B 0.02, Tc 4 and a scatter of 0.05.
     fn trapezoids() -> Vec<Block> {
@@ -406,6 +436,24 @@ mod tests {
         let (balance, verdict) = fit(&blocks, 20, &QUESTION);
         assert_eq!(verdict, Ok(()));
         assert!((balance.inertia.value - 0.3).abs() < 3e-3, "{balance:?}");
+    }
+
+    /// Without noise a coarse torque reads the same wrong value as long as a level lasts.
+    #[test]
+    fn the_steps_of_a_coarse_torque_are_in_the_uncertainty_but_where_noise_spreads_over_them() {
+        let level = |i: usize| [18.35, 0.3, -17.9, 0.3][i / 10 % 4];
+        let block = |i: usize| Block {
+            torque: f64::round(level(i)) + 0.01 * (i as f64 * 2.7).sin(),
+            speed: 60.0 + (i % 10) as f64,
+            acceleration: [60.0, 0.0, -60.0, 0.0][i / 10 % 4],
+        };
+        let blocks: Vec<Block> = (0..160).map(block).collect();
+        let found = |torque_step| fit(&blocks, 20, &Question { torque_step, ..QUESTION }).0.inertia;
+        let truth = 0.5 * (18.35 + 17.9) / 60.0;
+        let (blind, fair) = (found(0.0), found(1.0));
+        assert!((blind.value - truth).abs() > blind.uncertainty && (fair.value - truth).abs() < fair.uncertainty);
+        assert!((found(0.02).uncertainty - blind.uncertainty).abs() < 0.1 * blind.uncertainty);
+        assert_eq!(found(500.0), blind, "a wild sample is no step");
     }
 
     #[test]

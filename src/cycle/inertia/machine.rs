@@ -1,6 +1,7 @@
 //! The state machine of a measurement: ramps commanded by gib, or listening. The result is fitted off the cycle.
 
 use super::blocks::{Block, Gather};
+use super::fit::Question;
 use super::io::*;
 use super::plan::Plan;
 use super::report::InertiaReport;
@@ -142,7 +143,8 @@ impl Inertia {
         if self.phase != Phase::Done {
             return Err(Fault::of(GIB_ERR_STATE));
         }
-        Ok(InertiaReport::of(self.gather.blocks(), self.gather.length(), &self.plan.question))
+        let question = Question { torque_step: self.gather.torque_step(), ..self.plan.question };
+        Ok(InertiaReport::of(self.gather.blocks(), self.gather.length(), &question))
     }
 
     /// One servo cycle.

@@ -20,6 +20,7 @@ pub mod machine;
 pub mod plan;
 pub mod report;
 pub mod robust;
+pub mod stretches;
 
 #[cfg(test)]
 mod spindle_tests;

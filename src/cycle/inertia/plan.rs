@@ -71,7 +71,7 @@ impl Plan {
             torque_nm: 1.0,
             torque_bound: f64::MAX,
             lag_limit: f64::MAX,
-            question: Question { sample_s: 1e-3, target: 0.05, own: [0.0; 2], process_step: 0 },
+            question: Question { sample_s: 1e-3, torque_step: 0.0, target: 0.05, own: [0.0; 2], process_step: 0 },
         }
     }
 
@@ -104,6 +104,7 @@ impl Plan {
             torque_bound: unit(bound),
             question: Question {
                 sample_s: cycle,
+                torque_step: 0.0,
                 target,
                 own: [own, own_uncertainty],
                 process_step: process_step as i32,
@@ -113,7 +114,8 @@ impl Plan {
         if listen {
             let shortest = cycle * 4.0 * BLOCKS as f64 / 8.0;
             plan.listen_cycles = cycles(in_range("listen_s\0", c.listen_s, shortest, 3600.0)?);
-            plan.block = (plan.listen_cycles / PLANNED).max(4);
+            // The steps of a counted speed are as large as what a few samples change by: sixteen calm them, where that leaves 128 blocks.
+            plan.block = (plan.listen_cycles / PLANNED).max((plan.listen_cycles / 128).min(16)).max(4);
         } else {
             plan.add_ramps(c, takeup)?;
         }
@@ -213,6 +215,14 @@ mod tests {
         assert_eq!(field(InertiaConfig { mode: GIB_INERTIA_LISTEN, ..valid() }), "listen_s\0");
         assert_eq!(field(InertiaConfig { speed_high_rpm: f64::NAN, ..valid() }), "speed_high_rpm\0");
         assert_eq!(field(InertiaConfig { own_inertia_kg_m2: -1.0, ..valid() }), "own_inertia_kg_m2\0");
+    }
+
+    #[test]
+    fn a_short_time_to_listen_is_cut_into_blocks_that_calm_a_counted_speed() {
+        for (listen_s, block) in [(0.3, 4), (1.0, 7), (2.5, 16), (6.0, 16), (60.0, 146)] {
+            let config = InertiaConfig { mode: GIB_INERTIA_LISTEN, listen_s, ..valid() };
+            assert_eq!(Plan::new(&config).unwrap().block, block, "{listen_s} s");
+        }
     }
 
     #[test]

@@ -75,12 +75,16 @@ pub struct Regression {
     pub terms: Terms,
     /// Their variances.
     pub variance: Terms,
+    /// What these would be if each block's torque varied by 1 for itself.
+    pub inverse: Terms,
     /// Standard deviation of a block's torque about the fit, N·m.
     pub scatter: f64,
     /// Blocks that the result rests on.
     pub used: usize,
     /// Blocks dropped as outliers.
     pub dropped: usize,
+    /// Most of them that followed one another.
+    pub in_a_row: usize,
     /// Lags over blocks of that covariance.
     pub lag_share: f64,
     /// Share of the acceleration's variance, free of the other terms, that is noise.
@@ -92,6 +96,54 @@ impl Regression {
     #[must_use]
     pub fn excess(&self) -> f64 {
         self.terms[EXCESS] / self.variance[EXCESS].max(f64::MIN_POSITIVE).sqrt()
+    }
+}
+
+/// The normal equations of least squares, summed up.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Sums {
+    normal: Square,
+    right: Terms,
+    squares: f64,
+    weight: f64,
+}
+
+impl Sums {
+    fn add(&mut self, row: Terms, torque: f64, weight: f64) {
+        self.normal += weight * row * row.transpose();
+        self.right += weight * torque * row;
+        self.squares += weight * torque * torque;
+        self.weight += weight;
+    }
+
+    /// Of these and the others together.
+    #[must_use]
+    pub fn and(mut self, other: &Sums) -> Sums {
+        self.normal += other.normal;
+        self.right += other.right;
+        self.squares += other.squares;
+        self.weight += other.weight;
+        self
+    }
+
+    /// Inverse of the normal matrix and the solution, `noise` being the variance of the acceleration's noise.
+    fn solve(&self, noise: f64) -> Option<(Square, Terms)> {
+        let mut normal = self.normal;
+        normal[(0, 0)] -= self.weight * noise;
+        // A term that is not asked for, or that no block tells of, is nought.
+        for term in CONSTANT..TERMS {
+            normal[(term, term)] += f64::from(u8::from(normal[(term, term)] == 0.0));
+        }
+        let inverse = inverse(&normal)?;
+        Some((inverse, inverse * self.right))
+    }
+
+    /// The solution, the diagonal of that inverse, and the variance of a residual.
+    #[must_use]
+    pub fn plain(&self, noise: f64) -> Option<(Terms, Terms, f64)> {
+        let (inverse, terms) = self.solve(noise)?;
+        let squares = self.squares - 2.0 * self.right.dot(&terms) + terms.dot(&(self.normal * terms));
+        Some((terms, inverse.diagonal(), squares.max(0.0) / (self.weight - TERMS as f64).max(1.0)))
     }
 }
 
@@ -126,6 +178,34 @@ impl Rows<'_> {
         Rows { noise: self.noise.min(most), ..self }
     }
 
+    /// What is left of a block's torque beside the balance `terms`.
+    #[must_use]
+    pub fn off(&self, terms: &Terms, block: &Block) -> f64 {
+        block.torque - terms.dot(&self.row(block))
+    }
+
+    /// Stretches of two and more blocks that count and have one acceleration, within `apart`.
+    pub fn levels(&self, apart: f64) -> impl Iterator<Item = &[Block]> {
+        let near = move |a: &Block, b: &Block| (a.acceleration - b.acceleration).abs() <= apart;
+        let level = move |a: &Block, b: &Block| near(a, b) && self.counts(a) && self.counts(b);
+        self.blocks.chunk_by(level).filter(|blocks| blocks.len() > 1)
+    }
+
+    /// Standard deviation of a block's torque by what neighbours of one level differ: noise, whatever else is wrong. Where in a level
+    /// something happens, that counts once. 0 where there are none.
+    #[must_use]
+    pub fn noise_of_neighbours(&self, terms: &Terms, apart: f64) -> f64 {
+        let mut differences = [0.0; BLOCKS];
+        let mut n = 0;
+        let pairs = self.levels(apart).flat_map(|blocks| blocks.iter().zip(blocks.iter().skip(1)));
+        for ((a, b), place) in pairs.zip(differences.iter_mut()) {
+            *place = (self.off(terms, a) - self.off(terms, b)).abs();
+            n += 1;
+        }
+        let Some(seen) = differences.get_mut(..n).filter(|seen| !seen.is_empty()) else { return 0.0 };
+        STD_PER_MAD * *seen.select_nth_unstable_by(n / 2, f64::total_cmp).1 / core::f64::consts::SQRT_2
+    }
+
     fn unknowns(&self) -> usize {
         CONSTANT + usize::from(self.both_senses) + usize::from(self.suspected.is_some())
     }
@@ -134,7 +214,7 @@ impl Rows<'_> {
     fn residuals(&self, terms: &Terms, out: &mut [f64; BLOCKS]) -> usize {
         let mut n = 0;
         for (block, place) in self.blocks.iter().filter(|b| self.counts(b)).zip(out.iter_mut()) {
-            *place = block.torque - terms.dot(&self.row(block));
+            *place = self.off(terms, block);
             n += 1;
         }
         n
@@ -142,27 +222,36 @@ impl Rows<'_> {
 
     /// Inverse of the normal matrix and the solution under weights by residual.
     fn solve(&self, weight: impl Fn(&Block) -> f64) -> Option<(Square, Terms)> {
-        let mut normal = Square::zeros();
-        let mut right = Terms::zeros();
-        let mut sum = 0.0;
+        let mut sums = Sums::default();
         for block in self.blocks.iter().filter(|b| self.counts(b)) {
-            let (row, w) = (self.row(block), weight(block));
-            normal += w * row * row.transpose();
-            right += w * block.torque * row;
-            sum += w;
+            sums.add(self.row(block), block.torque, weight(block));
         }
-        normal[(0, 0)] -= sum * self.noise;
-        // A term that is not asked for, or that no block tells of, is nought.
-        for term in CONSTANT..TERMS {
-            normal[(term, term)] += f64::from(u8::from(normal[(term, term)] == 0.0));
-        }
-        let inverse = inverse(&normal)?;
-        Some((inverse, inverse * right))
+        sums.solve(self.noise)
     }
 
     /// The robust fit; `None` when the blocks do not determine the terms.
     #[must_use]
     pub fn fit(&self) -> Option<Regression> {
+        let (terms, far, n) = self.settled()?;
+        self.finish(|block| self.off(&terms, block).abs() <= far, n)
+    }
+
+    /// Least squares over the blocks that the [robust fit](Self::fit) keeps, by stretches of equal length in time.
+    #[must_use]
+    pub fn in_stretches<const N: usize>(&self) -> Option<[Sums; N]> {
+        let (terms, far, _) = self.settled()?;
+        let kept = || self.blocks.iter().filter(|b| self.counts(b) && self.off(&terms, b).abs() <= far);
+        let (mut stretches, count) = ([Sums::default(); N], kept().count());
+        for (i, block) in kept().enumerate() {
+            if let Some(stretch) = stretches.get_mut(i * N / count) {
+                stretch.add(self.row(block), block.torque, 1.0);
+            }
+        }
+        Some(stretches)
+    }
+
+    /// Terms that wrong blocks do not move, how far a residual may be from them, and how many blocks there are.
+    fn settled(&self) -> Option<(Terms, f64, usize)> {
         let (_, mut terms) = self.solve(|_| 1.0)?;
         let mut residuals = [0.0; BLOCKS];
         for weight in [absolute_values, biweight] {
@@ -172,8 +261,7 @@ impl Rows<'_> {
                     return None;
                 }
                 let scale = self.scale(&mut residuals, n);
-                let off = |block: &Block| (block.torque - terms.dot(&self.row(block))).abs() / scale;
-                let (inverse, next) = self.solve(|block| weight(off(block)))?;
+                let (inverse, next) = self.solve(|block| weight(self.off(&terms, block).abs() / scale))?;
                 let settled =
                     (0..TERMS).all(|i| (next[i] - terms[i]).powi(2) <= TRIFLE * scale * scale * inverse[(i, i)]);
                 terms = next;
@@ -183,9 +271,7 @@ impl Rows<'_> {
             }
         }
         let n = self.residuals(&terms, &mut residuals);
-        let far = FAR * self.scale(&mut residuals, n);
-        let near = |block: &Block| (block.torque - terms.dot(&self.row(block))).abs() <= far;
-        self.finish(near, n)
+        Some((terms, FAR * self.scale(&mut residuals, n), n))
     }
 
     /// Robust standard deviation of the first `n` residuals, which are reordered; never zero.
@@ -201,7 +287,7 @@ impl Rows<'_> {
     /// Least squares on the blocks that `near` lets through.
     fn finish(&self, near: impl Fn(&Block) -> bool, n: usize) -> Option<Regression> {
         let (inverse, terms) = self.solve(|block| if near(block) { 1.0 } else { 0.0 })?;
-        let residual = |block: &Block| block.torque - terms.dot(&self.row(block));
+        let residual = |block: &Block| self.off(&terms, block);
         let counted = || self.blocks.iter().filter(|b| self.counts(b) && near(b));
         let used = counted().count();
         let freedom = used.checked_sub(self.unknowns()).filter(|f| *f > 0)? as f64;
@@ -227,8 +313,25 @@ impl Rows<'_> {
         let free = 1.0 / (inverse[(0, 0)] * used as f64);
         let noise_share = self.noise / (self.noise + free);
         let lag_share = (lags + 1) as f64 / used as f64;
-        Some(Regression { terms, variance, scatter, used, dropped: n - used, lag_share, noise_share })
+        let in_a_row = longest(self.blocks.iter().filter(|b| self.counts(b)).map(|b| !near(b)));
+        Some(Regression {
+            terms,
+            variance,
+            inverse: inverse.diagonal(),
+            scatter,
+            used,
+            dropped: n - used,
+            in_a_row,
+            lag_share,
+            noise_share,
+        })
     }
+}
+
+/// Length of the longest run of `true`.
+fn longest(flags: impl Iterator<Item = bool>) -> usize {
+    let run = |(run, most): (usize, usize), flag| if flag { (run + 1, most.max(run + 1)) } else { (0, most) };
+    flags.fold((0, 0), run).1
 }
 
 /// Weight of a residual, given in standard deviations, under which least squares become least absolute values.
