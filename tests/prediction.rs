@@ -132,6 +132,40 @@ fn what_is_simulated_is_predicted_in_the_format_s_columns() {
 }
 
 #[test]
+fn rows_without_torque_leave_the_phase_of_a_ripple_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let machine = linear_machine(
+        folder.path(),
+        r#", "effects": [{"cause": "cogging", "parameters": {"amplitude_n": 30, "period_mm": 2.5}}]"#,
+    );
+    let (whole, holed) = (path("whole.csv"), path("holed.csv"));
+    let file = |path: &Path| path.to_str().unwrap().to_owned();
+    said(&gib(&[
+        "simulate",
+        "--machine",
+        &file(&machine),
+        "--moves",
+        "strokes",
+        "--seed",
+        "5",
+        "--out",
+        &file(&whole),
+    ]));
+    let text = std::fs::read_to_string(&whole).unwrap();
+    let without = |(row, line): (usize, &str)| match line.rsplit_once(',') {
+        Some((kept, _)) if row % 997 == 996 => format!("{kept},\n"),
+        _ => format!("{line}\n"),
+    };
+    std::fs::write(&holed, text.lines().enumerate().map(without).collect::<String>()).unwrap();
+    let (whole, holed) = (figures(&machine, &whole), figures(&machine, &holed));
+    for key in ["residual_torque_rms", "residual_position_rms_um"] {
+        let value = whole[key].as_f64().unwrap();
+        within(&holed, key, 0.5 * value, 1.5 * value);
+    }
+}
+
+#[test]
 fn a_trajectory_is_followed_and_a_list_of_moves_run() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();

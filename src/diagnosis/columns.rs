@@ -69,6 +69,8 @@ impl Columns {
             table: table.as_ref().map(|_| Vec::with_capacity(judged)),
             stretches: Vec::new(),
             torque_step: 0.0,
+            position_grid: 0.0,
+            table_grid: 0.0,
             period_s,
             recorded_period_s: period_s,
             left_out: rows - judged,
@@ -99,6 +101,8 @@ impl Columns {
             out.stretches.push(start..out.time_s.len());
         }
         out.torque_step = undithered_step(&out.torque);
+        out.position_grid = statistics::grid(&out.position).unwrap_or(0.0);
+        out.table_grid = out.table.as_deref().and_then(statistics::grid).unwrap_or(0.0);
         Ok(out)
     }
 
@@ -118,6 +122,12 @@ impl Columns {
     pub fn observed(&self) -> Option<Observed> {
         let copy = Columns::clone(self);
         Observed::from_columns(copy.time_s, copy.position, copy.torque, copy.command, copy.table, copy.stretches)
+    }
+
+    /// Of how many recorded rows one is the mean; its error is the mean of theirs.
+    #[must_use]
+    pub fn rows_in_one(&self) -> f64 {
+        (self.period_s / self.recorded_period_s).round().max(1.0)
     }
 
     /// The columns with so many rows averaged to one that no more than a thousand a second are left.
@@ -260,6 +270,8 @@ mod tests {
             table: None,
             stretches: vec![0..402, 402..1000, 1000..1003],
             torque_step: 0.0,
+            position_grid: 0.0,
+            table_grid: 0.0,
             period_s: 2.5e-4,
             recorded_period_s: 2.5e-4,
             left_out: 0,

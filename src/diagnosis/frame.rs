@@ -34,6 +34,11 @@ pub struct Columns {
     pub stretches: Vec<Range<usize>>,
     /// The torque's grid where its noise does not carry it over the steps, so that a mean of rows is no finer than one; else 0.
     pub torque_step: f64,
+    /// Grid of the encoder's readings as recorded, load units; 0 where they show none. Rounded as they are written, means of
+    /// them lie on no grid that can be read off.
+    pub position_grid: f64,
+    /// The same of the scale.
+    pub table_grid: f64,
     /// Row period, s.
     pub period_s: f64,
     /// Period of the rows as recorded, s.
@@ -99,6 +104,8 @@ pub struct Frame<'a> {
     stroke: (f64, f64),
     /// What the encoder's grid makes in the balance beyond what [`Frame::floor`] sees in second differences, drive's own unit.
     pub unseen: f64,
+    /// What the grids of encoder and scale make in table − encoder, load units.
+    grids_in_table: f64,
     /// Weights of the whole filter of what is smooth between rows, of the measured torque, and of the low-pass alone; odd.
     kernel: Vec<f64>,
     instant_kernel: Vec<f64>,
@@ -114,7 +121,7 @@ impl<'a> Frame<'a> {
         let unit = axis.drive.motor_per_load();
         let stretches = &columns.stretches;
         let h = columns.period_s;
-        let grid = crate::analysis::statistics::grid(&columns.position).unwrap_or(0.0);
+        let grid = columns.position_grid / columns.rows_in_one();
         let scatter = crate::analysis::statistics::white_noise(&columns.position).unwrap_or(0.0);
         let position_noise = (grid / 12f64.sqrt()).max(scatter);
         // Torque on a coarse grid may stand still for most rows, and seems to have no noise at all.
@@ -185,12 +192,14 @@ impl<'a> Frame<'a> {
             torque,
             stroke: columns.position.iter().fold((f64::MAX, f64::MIN), |(lo, hi), x| (x.min(lo), x.max(hi))),
             unseen: 0.0,
+            grids_in_table: 0.0,
             kernel,
             instant_kernel,
             torque_kernel,
             low_pass_kernel,
         };
         frame.unseen = grids::unseen_by_floor(&frame);
+        frame.grids_in_table = grids::in_table(&frame);
         frame
     }
 
@@ -259,12 +268,15 @@ impl<'a> Frame<'a> {
         sums
     }
 
-    /// table − encoder at the judged rows; empty without a table scale.
+    /// table − encoder at the judged rows, about its mean, since each sensor has a zero of its own; empty without a table scale.
     #[must_use]
     pub fn table_error(&self) -> Vec<f64> {
         self.columns.table.as_ref().map_or_else(Vec::new, |table| {
             let error: Vec<f64> = table.iter().zip(&self.columns.position).map(|(t, x)| t - x).collect();
-            self.low_passed(&error)
+            let mut error = self.low_passed(&error);
+            let mean = error.iter().sum::<f64>() / error.len().max(1) as f64;
+            error.iter_mut().for_each(|error| *error -= mean);
+            error
         })
     }
 
@@ -378,9 +390,7 @@ impl<'a> Frame<'a> {
         if averaged {
             return noise.hypot(self.unseen);
         }
-        // The grids of two position sensors do not average out where the axis creeps.
-        let grid = self.columns.table.as_ref().and_then(|t| crate::analysis::statistics::grid(t)).unwrap_or(0.0);
-        noise.max(grid.hypot(self.grid) / 12f64.sqrt()).max(SCALES_HOLD * (self.stroke.1 - self.stroke.0))
+        noise.max(self.grids_in_table).max(SCALES_HOLD * (self.stroke.1 - self.stroke.0))
     }
 
     /// Time from the first row, s.

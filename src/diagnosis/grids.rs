@@ -18,6 +18,8 @@ use std::f64::consts::PI;
 const TERMS: usize = 3;
 /// Over how many widths of the filter a place on the grid is smoothed; odd.
 const WIDE: usize = 9;
+/// Where a grid may lie, in steps: its offset is anybody's.
+const OFFSETS: [f64; 4] = [0.07, 0.31, 0.53, 0.84];
 /// How much larger than what the grids make a cause must be. Places on the grid are known to a fifth of a step or so, which
 /// takes up to half off the sums.
 const SURELY: f64 = 2.0;
@@ -28,23 +30,11 @@ const SURELY: f64 = 2.0;
 #[must_use]
 pub fn unseen_by_floor(frame: &Frame) -> f64 {
     let columns = frame.columns;
-    let many = rows_in_one(columns);
-    let encoder = Sensor::of(&columns.position, many);
+    let encoder = Sensor::encoder(columns);
     if encoder.grid <= 0.0 {
         return 0.0;
     }
-    // Smoothed over many steps of the grid, so that the place does not hold the error that is asked for.
-    let place = LowPass { width: WIDE * frame.low_pass.width }.run(&columns.position, &columns.stretches);
-    let slope = |i: usize| match place.get(i.wrapping_sub(1)..i + 2) {
-        Some(&[before, _, after]) => 0.5 * (after - before),
-        _ => 0.0,
-    };
-    let size = encoder.grid / many * encoder.left_of_term(1.0);
-    let error_of = |i: usize| -> f64 {
-        let turns = |part: usize| (place[i] + slope(i) * ((part as f64 + 0.5) / many - 0.5)) / encoder.grid;
-        (0..many as usize).map(turns).map(|turns| size * (turns - turns.round())).sum()
-    };
-    let error: Vec<f64> = (0..place.len()).map(error_of).collect();
+    let error = Place::of(frame, &columns.position).error_of(&encoder, 0.0);
     let per = frame.belief.inertia * frame.unit / columns.period_s.powi(2);
     let bend = |i: usize| match error.get(i.wrapping_sub(1)..i + 2) {
         Some(&[before, at, after]) => per * (after - 2.0 * at + before),
@@ -52,8 +42,62 @@ pub fn unseen_by_floor(frame: &Frame) -> f64 {
     };
     let mut made = frame.low_passed(&(0..error.len()).map(bend).collect::<Vec<_>>());
     made.iter_mut().zip(&frame.weights).for_each(|(made, weight)| *made *= weight);
-    let square = dot(&made, &made) / made.len().max(1) as f64;
-    (square - frame.floor(&made, true).powi(2)).max(0.0).sqrt()
+    (mean_square(&made) - frame.floor(&made, true).powi(2)).max(0.0).sqrt()
+}
+
+/// What the grids of encoder and scale make in table − encoder, RMS over the judged rows, load units; 0 without a scale. It
+/// averages out where many steps pass within the filter, and stands where the axis creeps or rows beat with the grid.
+#[must_use]
+pub fn in_table(frame: &Frame) -> f64 {
+    let columns = frame.columns;
+    let (Some(table), Some(scale)) = (&columns.table, Sensor::scale(columns)) else { return 0.0 };
+    let encoder = Sensor::encoder(columns);
+    // The finer sensor knows the place better.
+    let place = Place::of(frame, if scale.grid < encoder.grid { table } else { &columns.position });
+    let made = |sensor: &Sensor| {
+        let errors = OFFSETS.map(|offset| place.error_of(sensor, offset));
+        let rows: Vec<[f64; OFFSETS.len()]> = (0..table.len()).map(|i| errors.each_ref().map(|e| e[i])).collect();
+        let filtered = frame.low_passed_together(&rows);
+        filtered.iter().map(|made| mean_square(made)).sum::<f64>() / OFFSETS.len() as f64
+    };
+    (made(&encoder) + made(&scale)).sqrt()
+}
+
+fn mean_square(values: &[f64]) -> f64 {
+    dot(values, values) / values.len().max(1) as f64
+}
+
+/// Where an axis is, smoothed over many steps of a grid, so that the place does not hold the error that is asked for.
+struct Place {
+    /// Load units, and per row.
+    rows: Vec<(f64, f64)>,
+    /// Of how many recorded rows one is the mean.
+    many: f64,
+}
+
+impl Place {
+    fn of(frame: &Frame, readings: &[f64]) -> Self {
+        let columns = frame.columns;
+        let place = LowPass { width: WIDE * frame.low_pass.width }.run(readings, &columns.stretches);
+        let slope = |i: usize| match place.get(i.wrapping_sub(1)..i + 2) {
+            Some(&[before, _, after]) => 0.5 * (after - before),
+            _ => 0.0,
+        };
+        Self { rows: place.iter().enumerate().map(|(i, x)| (*x, slope(i))).collect(), many: columns.rows_in_one() }
+    }
+
+    /// The error of a sensor by its grid that lies so many steps beside the place's zero, every row, load units.
+    fn error_of(&self, sensor: &Sensor, offset: f64) -> Vec<f64> {
+        if sensor.grid <= 0.0 {
+            return vec![0.0; self.rows.len()];
+        }
+        let size = sensor.grid / self.many * sensor.left_of_term(1.0);
+        let at = |&(x, slope): &(f64, f64)| -> f64 {
+            let turns = |part: usize| (x + slope * ((part as f64 + 0.5) / self.many - 0.5)) / sensor.grid + offset;
+            (0..self.many as usize).map(turns).map(|turns| size * (turns - turns.round())).sum()
+        };
+        self.rows.iter().map(at).collect()
+    }
 }
 
 /// A part that may well be the grids': one in table − encoder, or a ripple of the torque; `without` are the fits without each
@@ -99,7 +143,7 @@ fn is_within_a_step(bench: &Bench, fit: &Fit, part: usize) -> bool {
 fn sawtooth(bench: &Bench, fit: &Fit) -> Vec<[Vec<f64>; 2]> {
     let (frame, columns) = (bench.frame, bench.frame.columns);
     let (Some(readings), Some([encoder, scale])) = (&columns.table, sensors(bench)) else { return Vec::new() };
-    let many = rows_in_one(columns);
+    let many = columns.rows_in_one();
     // A reading holds its own error, and seems to stand on its grid wherever the axis is: the place is told by the other
     // sensor, unless that is the coarser one by far.
     let (seen, apart) = (frame.low_pass.run(readings, &columns.stretches), table_beyond_encoder(bench, fit));
@@ -130,13 +174,8 @@ fn sawtooth(bench: &Bench, fit: &Fit) -> Vec<[Vec<f64>; 2]> {
 
 /// Encoder and scale.
 fn sensors(bench: &Bench) -> Option<[Sensor; 2]> {
-    let (columns, many) = (bench.frame.columns, rows_in_one(bench.frame.columns));
-    Some([&columns.position, columns.table.as_ref()?].map(|readings| Sensor::of(readings, many)))
-}
-
-/// Of how many rows one is the mean; its error is that of their errors.
-fn rows_in_one(columns: &Columns) -> f64 {
-    (columns.period_s / columns.recorded_period_s).round().max(1.0)
+    let columns = bench.frame.columns;
+    Some([Sensor::encoder(columns), Sensor::scale(columns)?])
 }
 
 /// A position sensor.
@@ -148,9 +187,17 @@ struct Sensor {
 }
 
 impl Sensor {
+    fn encoder(columns: &Columns) -> Self {
+        Self::of(&columns.position, columns.position_grid, columns.rows_in_one())
+    }
+
+    fn scale(columns: &Columns) -> Option<Self> {
+        Some(Self::of(columns.table.as_ref()?, columns.table_grid, columns.rows_in_one()))
+    }
+
     /// By its readings, each the mean of so many: they lie on as many parts of the grid, with so much less noise.
-    fn of(readings: &[f64], many: f64) -> Self {
-        let grid = many * statistics::grid(readings).map_or(0.0, |grid| sharpened(grid, readings));
+    fn of(readings: &[f64], grid: f64, many: f64) -> Self {
+        let grid = if grid > 0.0 { many * sharpened(grid / many, readings) } else { 0.0 };
         // What the grid itself makes is no noise on it. From row to row that may swing to and fro, and look like more: noise looks
         // alike at every spacing.
         let at_spacing = |rows: usize| -> Option<f64> {

@@ -30,7 +30,8 @@ pub const LITTLE_LEFT: f64 = 0.5;
 /// Share of what is explained above which it is mostly a curve over one coordinate.
 const MOSTLY: f64 = 2.0 / 3.0;
 /// Share of what is explained (in variance) that may be left along that coordinate: a sixth in amplitude. Laws of the right form
-/// leave a hundredth of that; several of a wrong form together imitate a curve, and leave more.
+/// leave a thirtieth of that, harmonics that are too weak to be named included, and real slides more; several of a wrong form
+/// together imitate a curve, and leave more than that.
 pub const MOST_OF_A_CURVE: f64 = 0.03;
 
 /// Least ratio of what a machine errs by without causes over what it errs by with them for a channel to show them. In the balance
@@ -97,7 +98,8 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let judged = |errors: &Option<Errors>| errors.as_ref().map(|errors| self.held_out.judged(errors));
         let in_judged_rows = self.held_out.gains(judged(&self.believed).as_ref(), judged(&errors).as_ref());
         let effects: Vec<Effect> = found.fit.effects(self.bench.frame).collect();
-        if !refuted(&in_judged_rows, &effects) {
+        let misleads = verdict == Verdict::PartlyExplained && moves_worse(&in_judged_rows);
+        if !misleads && !refuted(&in_judged_rows, &effects) {
             return Ok(Judged { verdict, selection: found, gains, refutation: None });
         }
         let causes = found.fit.parts.iter().map(|p| p.law.cause);
@@ -180,6 +182,12 @@ pub fn refuted(gains: &[Gain], causes: &[Effect]) -> bool {
     let surely_better = silent || gains.iter().any(|gain| gain.ci95[0] > 1.0);
     let surely_worse = motor().any(|gain| gain.ci95[1] < 1.0);
     motor().map(|gain| (gain.before / gain.after).ln()).sum::<f64>() < 0.0 && (surely_worse || !surely_better)
+}
+
+/// Whether a machine surely moves worse than the belief under its servo. What is right as far as it goes may leave much, and moves
+/// no worse for it; what stands in for something else follows the torque and not what made it.
+fn moves_worse(gains: &[Gain]) -> bool {
+    gains.iter().any(|gain| gain.channel == "position" && gain.ci95[1] < 1.0)
 }
 
 /// Whether a hold-out shows in any channel what the causes change: one whose moves do not call them up says nothing of them.

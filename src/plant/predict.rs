@@ -222,11 +222,13 @@ fn set_phases(physics: &mut Physics, observed: &Observed, delivered: &[f64], shi
     let quarter = time.len() / 4;
     let place = |i: usize| (motion.position[i], time[i] - time[0]);
     let standing = 0.01 * rms(motion.velocity.iter().copied().filter(|v| v.is_finite()));
-    let rows: Vec<usize> = (0..quarter)
-        .filter(|&i| delivered[i].is_finite() && observed.torque[i].is_finite() && motion.velocity[i].abs() > standing)
-        .collect();
-    let residual: Vec<f64> =
-        rows.iter().map(|&i| physics.delivered(cubic_at(&observed.torque, i as f64 + shift)) - delivered[i]).collect();
+    // Beside a row without torque the one between rows is not known either.
+    let left = |i: usize| physics.delivered(cubic_at(&observed.torque, i as f64 + shift)) - delivered[i];
+    let (rows, residual): (Vec<usize>, Vec<f64>) = (0..quarter)
+        .filter(|&i| motion.velocity[i].abs() > standing && motion.acceleration[i].is_finite())
+        .map(|i| (i, left(i)))
+        .filter(|(_, left)| left.is_finite())
+        .unzip();
     let cogging = physics.cogging.len();
     let mut ripples: Vec<&mut Ripple> = physics.cogging.iter_mut().chain(&mut physics.vibration).collect();
     if ripples.is_empty() {

@@ -5,8 +5,9 @@ use crate::diagnosis::many::sines_and_cosines;
 use crate::machine::Drive;
 use realfft::RealFftPlanner;
 
-/// Bins along the stroke: eight to the shortest period looked for.
-const STROKE_BINS: usize = 1 << 14;
+/// Bins along the stroke, eight to the shortest period looked for: as many as there are rows, within these bounds. Coupled to a
+/// fine screw, slots and poles repeat some thousand times over a stroke.
+const STROKE_BINS: [usize; 2] = [1 << 14, 1 << 17];
 /// Starts handed on from each octave.
 const MOST: usize = 2;
 /// Least share of the rest's squares that a peak explains by its height. A cause needs eight times as much to be named, and
@@ -42,16 +43,17 @@ pub fn along_stroke(frame: &Frame, rest: &[f64]) -> Vec<Vec<f64>> {
     if !(stroke > 0.0) || rest.is_empty() {
         return Vec::new();
     }
-    let mut bins = vec![0.0; 2 * STROKE_BINS];
+    let count = frame.x.len().next_power_of_two().clamp(STROKE_BINS[0], STROKE_BINS[1]);
+    let mut bins = vec![0.0; 2 * count];
     for (&row, value) in frame.kept.iter().zip(rest) {
-        let at = ((frame.x[row] - low) / stroke * (STROKE_BINS - 1) as f64) as usize;
+        let at = ((frame.x[row] - low) / stroke * (count - 1) as f64) as usize;
         if let Some(bin) = bins.get_mut(at) {
             *bin += value;
         }
     }
     // Two transform lengths over the stroke: half periods are resolved. Periods below eight bins or eight encoder steps,
     // and fewer than LEAST_PERIODS over the stroke, are not looked for.
-    let most = (STROKE_BINS / 8).min((stroke / (8.0 * frame.grid.max(1e-9))) as usize);
+    let most = (count / 8).min((stroke / (8.0 * frame.grid.max(1e-9))) as usize);
     let mut starts = peaks(&mut bins, ((2.0 * LEAST_PERIODS) as usize, 2 * most), 0.5, least_power(rest));
     let (turns, table) = match frame.axis.drive {
         Drive::BallScrew { lead_mm } => (stroke / lead_mm, 0.0),
