@@ -20,8 +20,13 @@ use crate::plant::physics::LEAST_SLOPE;
 
 /// Excess over the noise floor (in variance) below which a belief holds.
 const TOLERABLE_EXCESS: f64 = 0.6;
+/// The same of what is tied to no coordinate: noise of a current that was filtered over some rows is up to three times what second
+/// differences see of it, and what no move calls up is no machine's doing before that.
+const TOLERABLE_IF_UNTIED: f64 = 8.0;
 /// Share of the excess that named causes must remove together.
 const LEAST_EXPLAINED: f64 = 0.8;
+/// The same where what they leave may be noise.
+const LEAST_EXPLAINED_OF_NOISE: f64 = 0.4;
 /// The same for lost motion: rigid flanks that meet without rebound place a clearance well, but not each impact.
 const LEAST_EXPLAINED_LOST_MOTION: f64 = 0.4;
 /// Excess (in variance) that may be left for everything to count as explained.
@@ -121,7 +126,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     #[must_use]
     pub fn nothing(&self, found: &Selection) -> Judged {
         let before = Excess::of(self.bench, &self.empty, &found.fit);
-        let unknown = before.largest() > TOLERABLE_EXCESS;
+        let unknown = before.largest() > TOLERABLE_EXCESS && !self.may_be_noise(&self.empty, &before);
         Judged {
             verdict: if unknown { Verdict::UnknownCause } else { Verdict::NoDiscrepancy },
             selection: Selection { fit: self.empty.clone(), rivals: Vec::new(), alike: Vec::new() },
@@ -130,12 +135,25 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         }
     }
 
+    /// Whether what a fit leaves above the noise floor may be noise that the floor does not see.
+    fn may_be_noise(&self, fit: &Fit, left: &Excess) -> bool {
+        left.of_channel(1) <= TOLERABLE_EXCESS
+            && left.of_channel(0) <= TOLERABLE_IF_UNTIED
+            && !show::is_tied(self.bench, fit)
+    }
+
     /// How well a set of causes explains the excess; `None` where it does not, or none of them can be named.
     fn explains(&self, fit: &Fit) -> Option<Verdict> {
         let before = Excess::of(self.bench, &self.empty, fit);
         let after = Excess::of(self.bench, fit, fit);
         let lost_motion = fit.parts.iter().any(|p| p.law.cause == Cause::Backlash);
-        let least = if lost_motion { LEAST_EXPLAINED_LOST_MOTION } else { LEAST_EXPLAINED };
+        let least = if lost_motion {
+            LEAST_EXPLAINED_LOST_MOTION
+        } else if self.may_be_noise(fit, &after) {
+            LEAST_EXPLAINED_OF_NOISE
+        } else {
+            LEAST_EXPLAINED
+        };
         let too_little = before.largest() > TOLERABLE_EXCESS && before.explained_by(&after) < least;
         let much_left = after.largest() > LITTLE_LEFT;
         let nameless = fit.effects(self.bench.frame).next().is_none();

@@ -24,6 +24,9 @@ pub struct View {
     pub curve: Vec<(f64, f64, f64)>,
 }
 
+/// Share of its variance from which a residual is said to go with a coordinate.
+const TIED: f64 = 0.05;
+
 /// What a residual may go with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Coordinate {
@@ -125,10 +128,16 @@ fn places(frame: &Frame, coordinate: Coordinate) -> Vec<f64> {
     }
 }
 
+/// Whether the torque residual of a fit goes with a coordinate at all.
+#[must_use]
+pub fn is_tied(bench: &Bench, fit: &Fit) -> bool {
+    views(bench, fit, fit).iter().any(|view| view.after > TIED)
+}
+
 /// What is left, in a few words; `excess` is the variance above the noise floor, in units of the floor's.
 #[must_use]
 pub fn describe(views: &[View], excess: f64) -> String {
-    let mut list: Vec<&View> = views.iter().filter(|view| view.after > 0.05).collect();
+    let mut list: Vec<&View> = views.iter().filter(|view| view.after > TIED).collect();
     list.sort_by(|a, b| b.after.total_cmp(&a.after));
     let strong: Vec<String> = list
         .iter()
