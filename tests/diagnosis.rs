@@ -234,6 +234,27 @@ fn what_fits_nothing_is_called_unknown() {
     );
 }
 
+/// A current that was filtered over some rows makes noise that second differences see too little of; what wanders over seconds is
+/// of the same size, and no noise.
+#[test]
+fn noise_of_a_filtered_current_is_no_discrepancy_and_a_wandering_one_is() {
+    let mut noise = noise(29);
+    let mut lagged = |kept: f64| -> Recording {
+        let size = 0.06 * (1.0f64 - kept * kept).sqrt();
+        let mut value = 0.0;
+        let follow = |_| {
+            value = kept * value + size * noise();
+            value
+        };
+        let values: Vec<f64> = (0..30_000).map(follow).collect();
+        recording(|t, _, _, _| values[(1e3 * t).round() as usize])
+    };
+    for kept in [0.7, 0.85] {
+        assert_eq!(judged(&lagged(kept)).verdict, Verdict::NoDiscrepancy, "{kept}");
+    }
+    assert_eq!(judged(&lagged(0.9995)).verdict, Verdict::UnknownCause);
+}
+
 #[test]
 fn what_the_hold_out_contradicts_is_not_named() {
     let (more, as_believed) = (recording(|_, _, v, _| 0.3 * v.signum()), recording(|_, _, _, _| 0.0));
