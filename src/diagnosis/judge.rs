@@ -20,9 +20,9 @@ use crate::plant::physics::LEAST_SLOPE;
 
 /// Excess over the noise floor (in variance) below which a belief holds.
 const TOLERABLE_EXCESS: f64 = 0.6;
-/// The same of what is tied to no coordinate: noise of a current that was filtered over some rows is up to three times what second
+/// The same of what is tied to no coordinate: noise of a current that was filtered over some rows is up to twice what second
 /// differences see of it, and what no move calls up is no machine's doing before that.
-const TOLERABLE_IF_UNTIED: f64 = 8.0;
+const TOLERABLE_IF_UNTIED: f64 = 3.0;
 /// Share of the excess that named causes must remove together.
 const LEAST_EXPLAINED: f64 = 0.8;
 /// The same where what they leave may be noise.
