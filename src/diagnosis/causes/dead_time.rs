@@ -8,7 +8,7 @@ use crate::diagnosis::sampling::Timing;
 /// The trace is the measured torque less itself moved up; it has no coefficient.
 pub static LAW: Law = Law {
     cause: Cause::DeadTime,
-    scales: &[Scale::Linear(-20.0, 20.0, 0.05)],
+    scales: &[Scale::Linear(-50.0, 50.0, 0.05)],
     starts: |frame, _| {
         if frame.sampling.timing == Timing::Aligned {
             return Vec::new();
