@@ -122,11 +122,19 @@ fn a_ripple_of_few_periods_over_the_stroke_is_found_and_a_single_swing_is_none()
 }
 
 #[test]
-fn a_bump_of_friction_at_one_speed_is_no_sum_of_frictions() {
+fn a_bump_or_a_step_of_friction_at_one_speed_is_no_sum_of_frictions() {
     let bump = |_: f64, _: f64, v: f64, _: f64| 0.4 * v.signum() * (-((v.abs() - 50.0) / 12.0).powi(2)).exp();
     let d = judged(&recording(bump));
     assert_eq!((d.verdict, d.findings.len()), (Verdict::UnknownCause, 0), "{d:?}");
     assert!(d.unexplained.torque.describes.contains("velocity"), "{}", d.unexplained.torque.describes);
+    let step = |_: f64, _: f64, v: f64, _: f64| 0.1 * v.signum() * (1.0 + ((v.abs() - 40.0) / 3.0).tanh());
+    let d = judged(&recording(step));
+    assert_eq!((d.verdict, d.findings.len()), (Verdict::UnknownCause, 0), "{d:?}");
+    // What goes back at speed and not to nothing is what it is.
+    let both = |_: f64, _: f64, v: f64, _: f64| v.signum() * (0.1 - 0.3 * (-(v / 15.0).powi(2)).exp());
+    let named: Vec<Cause> = judged(&recording(both)).findings.iter().map(|f| f.effect.cause()).collect();
+    assert_eq!(named.len(), 2, "{named:?}");
+    assert!([Cause::StribeckFriction, Cause::CoulombFrictionMismatch].iter().all(|c| named.contains(c)), "{named:?}");
 }
 
 /// There and back at 100 mm/s, where rows are 400 steps of the scale's grid apart and a little more: its error beats every

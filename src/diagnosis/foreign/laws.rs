@@ -29,7 +29,7 @@ impl Foreign {
     }
 }
 
-pub static LAWS: [Foreign; 19] = [
+pub static LAWS: [Foreign; 21] = [
     Foreign {
         goes: "with the cube of speed",
         numbers: 1,
@@ -58,6 +58,18 @@ pub static LAWS: [Foreign; 19] = [
         numbers: 3,
         somewhere: true,
         regressors: |frame, share| vec![about(frame, share, 4.0)],
+    },
+    Foreign {
+        goes: "as a friction that is another from one speed on",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| vec![from_speed(frame, share, 0.02)],
+    },
+    Foreign {
+        goes: "as a friction that is another from one speed on",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| vec![from_speed(frame, share, 0.25)],
     },
     Foreign {
         goes: "as a friction that grows with acceleration",
@@ -209,6 +221,12 @@ fn any_form(frame: &Frame, along: impl Fn(usize) -> f64, of: impl Fn(usize) -> f
 fn about(frame: &Frame, share: f64, ways: f64) -> Vec<f64> {
     let (per, at) = (PLACES as f64 / (ways * frame.top_speed()), share * PLACES as f64 / ways);
     frame.fading(&frame.v, move |v| (v.abs() * per - at).powi(2))
+}
+
+/// Friction from one speed on, at a share of the top speed; it comes over a part of that speed.
+fn from_speed(frame: &Frame, share: f64, part: f64) -> Vec<f64> {
+    let (per, from) = (1.0 / (part * share * frame.top_speed()), (1.0 - 0.5 * part) / part);
+    frame.judged_by(|i| frame.direction[i] * (frame.v[i].abs() * per - from).clamp(0.0, 1.0))
 }
 
 /// Way since the axis rested or turned last, load units, every row.
