@@ -46,7 +46,8 @@ pub fn unseen_by_floor(frame: &Frame) -> f64 {
 }
 
 /// What the grids of encoder and scale make in table − encoder, RMS over the judged rows, load units; 0 without a scale. It
-/// averages out where many steps pass within the filter, and stands where the axis creeps or rows beat with the grid.
+/// averages out where many steps pass within the filter, and stands where rows beat with the grid or the axis creeps: as far as
+/// a row's own step that is taken for granted, since the place is not known to a part of a step there.
 #[must_use]
 pub fn in_table(frame: &Frame) -> f64 {
     let columns = frame.columns;
@@ -60,7 +61,8 @@ pub fn in_table(frame: &Frame) -> f64 {
         let filtered = frame.low_passed_together(&rows);
         filtered.iter().map(|made| mean_square(made)).sum::<f64>() / OFFSETS.len() as f64
     };
-    (made(&encoder) + made(&scale)).sqrt()
+    let creeping = encoder.grid.hypot(scale.grid) / (12f64.sqrt() * columns.rows_in_one());
+    (made(&encoder) + made(&scale)).sqrt().max(creeping)
 }
 
 fn mean_square(values: &[f64]) -> f64 {
