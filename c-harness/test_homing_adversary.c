@@ -3,21 +3,14 @@
  * every time, so that what a change breaks is found at once and again; some are fresh, with a seed that is printed. Only those of
  * one seed: test_homing_adversary SEED [RUNS]. A run by itself: SEED as printed for it, 1.
  */
+#include "fresh_runs.h"
 #include "homing_adversary.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <time.h>
-
-#include <cmocka.h>
 
 enum { KNOWN_SEED = 20260101, KNOWN_RUNS = 2000, FRESH_RUNS = 100 };
 
-static uint64_t fresh_seed;
-static int fresh_runs = FRESH_RUNS;
+static fresh_runs fresh = {.runs = FRESH_RUNS};
 
 static void describe(const homing_adversary *a, uint64_t its_seed)
 {
@@ -61,17 +54,14 @@ static void every_law_holds_in_known_runs(void **state)
 static void every_law_holds_in_fresh_runs(void **state)
 {
     (void)state;
-    every_law_holds(fresh_seed, fresh_runs);
+    every_law_holds(fresh.seed, fresh.runs);
 }
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest all[] = {
+    const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_law_holds_in_known_runs),
         cmocka_unit_test(every_law_holds_in_fresh_runs),
     };
-    const struct CMUnitTest asked[] = {cmocka_unit_test(every_law_holds_in_fresh_runs)};
-    fresh_seed = argc > 1 ? strtoull(argv[1], NULL, 10) : (uint64_t)time(NULL) * 1000u;
-    fresh_runs = argc > 2 ? atoi(argv[2]) : fresh_runs;
-    return argc > 1 ? cmocka_run_group_tests(asked, NULL, NULL) : cmocka_run_group_tests(all, NULL, NULL);
+    return fresh_runs_main(argc, argv, &fresh, tests, sizeof tests / sizeof *tests);
 }

@@ -7,21 +7,14 @@
  * off, two of them without trouble, by more than three times what they said. One wrong value is allowed therefore, and one more in 500
  * runs: at one in a thousand, ten fresh runs fail by chance once in twenty thousand times; without that, once in a hundred.
  */
+#include "fresh_runs.h"
 #include "inertia_adversary.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdlib.h>
 #include <string.h>
-#include <time.h>
-
-#include <cmocka.h>
 
 enum { KNOWN_SEED = 20260300, KNOWN_RUNS = 250, FRESH_RUNS = 10 };
 
-static uint64_t fresh_seed;
-static int fresh_runs = FRESH_RUNS;
+static fresh_runs fresh = {.runs = FRESH_RUNS};
 static inertia_adversary a;
 
 static void describe(uint64_t seed)
@@ -94,8 +87,8 @@ static void every_law_holds_in_known_runs(void **state)
 static void every_law_holds_in_fresh_runs(void **state)
 {
     (void)state;
-    tally t = count(fresh_seed, fresh_runs);
-    assert_true(every_law_holds(&t, fresh_runs));
+    tally t = count(fresh.seed, fresh.runs);
+    assert_true(every_law_holds(&t, fresh.runs));
 }
 
 /* The laws can fail: each of these mistakes, put in on purpose, breaks the one that is about it. */
@@ -126,13 +119,10 @@ static void mistakes_break_laws(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest all[] = {
+    const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_law_holds_in_known_runs),
         cmocka_unit_test(mistakes_break_laws),
         cmocka_unit_test(every_law_holds_in_fresh_runs),
     };
-    const struct CMUnitTest asked[] = {cmocka_unit_test(every_law_holds_in_fresh_runs)};
-    fresh_seed = argc > 1 ? strtoull(argv[1], NULL, 10) : (uint64_t)time(NULL) * 1000u;
-    fresh_runs = argc > 2 ? atoi(argv[2]) : fresh_runs;
-    return argc > 1 ? cmocka_run_group_tests(asked, NULL, NULL) : cmocka_run_group_tests(all, NULL, NULL);
+    return fresh_runs_main(argc, argv, &fresh, tests, sizeof tests / sizeof *tests);
 }

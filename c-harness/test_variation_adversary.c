@@ -2,24 +2,15 @@
  * Speed variation against somebody who means it ill: random motors, configurations and troubles under a power meter, see
  * variation_adversary.h. Most runs are the same every time; some are fresh, with a seed that is printed. Only those of one seed:
  * test_variation_adversary SEED [RUNS]. A run by itself: SEED as printed for it, 1.
- *
- * Of 80000 fresh runs one broke a law, so that those of a test do once in four thousand times.
  */
+#include "fresh_runs.h"
 #include "variation_adversary.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdlib.h>
 #include <string.h>
-#include <time.h>
-
-#include <cmocka.h>
 
 enum { KNOWN_SEED = 20260400, KNOWN_RUNS = 2000, FRESH_RUNS = 20 };
 
-static uint64_t fresh_seed;
-static int fresh_runs = FRESH_RUNS;
+static fresh_runs fresh = {.runs = FRESH_RUNS};
 static variation_adversary a;
 
 static void describe(uint64_t seed)
@@ -64,7 +55,7 @@ static void every_law_holds_in_known_runs(void **state)
 static void every_law_holds_in_fresh_runs(void **state)
 {
     (void)state;
-    every_law_holds(fresh_seed, fresh_runs);
+    every_law_holds(fresh.seed, fresh.runs);
 }
 
 /* The laws can fail: each of these mistakes, put in on purpose, breaks the one that is about it. */
@@ -97,13 +88,10 @@ static void mistakes_break_laws(void **state)
 
 int main(int argc, char **argv)
 {
-    const struct CMUnitTest all[] = {
+    const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_law_holds_in_known_runs),
         cmocka_unit_test(mistakes_break_laws),
         cmocka_unit_test(every_law_holds_in_fresh_runs),
     };
-    const struct CMUnitTest asked[] = {cmocka_unit_test(every_law_holds_in_fresh_runs)};
-    fresh_seed = argc > 1 ? strtoull(argv[1], NULL, 10) : (uint64_t)time(NULL) * 1000u;
-    fresh_runs = argc > 2 ? atoi(argv[2]) : fresh_runs;
-    return argc > 1 ? cmocka_run_group_tests(asked, NULL, NULL) : cmocka_run_group_tests(all, NULL, NULL);
+    return fresh_runs_main(argc, argv, &fresh, tests, sizeof tests / sizeof *tests);
 }
