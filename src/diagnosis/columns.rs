@@ -1,10 +1,11 @@
 //! Takes an axis's columns out of a recording: converted to the drive's units, in stretches of whole, equidistant rows.
 
 use super::frame::Columns;
+use super::stretches::{Stretch, fill_smooth, fill_straight, joined, without_long_holes};
 use crate::analysis::statistics;
 use crate::machine::Axis;
-use crate::plant::motion::{are_even, times_of_rows};
 use crate::plant::observed::Observed;
+use crate::plant::stamps::are_even;
 use crate::recording::{Column, IssueKind, Recording, RecordingError, Signal, Unit};
 use std::ops::Range;
 
@@ -53,10 +54,10 @@ impl Columns {
         let position = source(Signal::Position, load)?;
         let torque = source(torque_signal, torque_unit)?;
         let (table, command) = (optional(Signal::TablePosition)?, optional(Signal::PositionCommand)?);
-        let mut whole =
-            vec![recording.column(&axis.name, Signal::Position)?, recording.column(&axis.name, torque_signal)?];
-        whole.extend(held(Signal::TablePosition));
-        let runs = recording.runs(&whole);
+        let mut beside = vec![recording.column(&axis.name, torque_signal)?];
+        beside.extend(held(Signal::TablePosition));
+        let encoder = recording.column(&axis.name, Signal::Position)?;
+        let runs = without_long_holes(recording.runs(&[encoder]), &beside, recording.sampling.period_s);
         let rows: usize = runs.iter().map(ExactSizeIterator::len).sum();
         let runs = spread(runs);
         let period_s = recording.sampling.period_s;
@@ -67,6 +68,7 @@ impl Columns {
             torque: Vec::with_capacity(judged),
             command: command.as_ref().map(|_| Vec::with_capacity(judged)),
             table: table.as_ref().map(|_| Vec::with_capacity(judged)),
+            known: Vec::with_capacity(judged),
             stretches: Vec::new(),
             torque_step: 0.0,
             position_grid: 0.0,
@@ -75,35 +77,89 @@ impl Columns {
             recorded_period_s: period_s,
             left_out: rows - judged,
         };
-        for run in runs {
+        let mut take = |stretch: &Stretch, times: &[f64], on_grid: bool| {
             let start = out.time_s.len();
-            let times = &*times_of_rows(&recording.time_s[run.clone()], &position.values[run.clone()]);
-            let even = if are_even(times, 0.02) { None } else { Some(even_times(times, period_s)) };
-            let take = |to: &mut Vec<f64>, from: &Source| {
-                let values = &from.values[run.clone()];
-                match &even {
-                    None => to.extend(values.iter().map(|v| v * from.factor)),
-                    Some(wanted) => to.extend(interpolate(times, values, wanted).map(|v| v * from.factor)),
+            let grid = if on_grid { None } else { Some(even_times(times, period_s)) };
+            let (rows, places) = (stretch.rows().collect::<Vec<_>>(), stretch.places());
+            let count = grid.as_ref().map_or_else(|| places.last().map_or(0, |last| last + 1), Vec::len);
+            let take = |to: &mut Vec<f64>, from: &dyn Fn(usize) -> f64| match &grid {
+                Some(wanted) => {
+                    let values: Vec<f64> = rows.iter().map(|&row| from(row)).collect();
+                    to.extend(interpolate(times, &values, wanted));
+                }
+                None => {
+                    to.resize(start + count, f64::NAN);
+                    rows.iter().zip(&places).for_each(|(row, place)| to[start + place] = from(*row));
                 }
             };
-            take(&mut out.position, &position);
-            take(&mut out.torque, &torque);
+            take(&mut out.position, &|row| position.values[row] * position.factor);
+            take(&mut out.torque, &|row| torque.values[row] * torque.factor);
             if let (Some(to), Some(from)) = (&mut out.table, &table) {
-                take(to, from);
+                take(to, &|row| from.values[row] * from.factor);
             }
             if let (Some(to), Some(from)) = (&mut out.command, &command) {
-                take(to, from);
+                take(to, &|row| from.values[row] * from.factor);
             }
-            match even {
+            match grid {
                 Some(even) => out.time_s.extend(even),
-                None => out.time_s.extend_from_slice(times),
+                None => {
+                    out.time_s.resize(start + count, f64::NAN);
+                    times.iter().zip(&places).for_each(|(t, place)| out.time_s[start + place] = *t);
+                    fill_straight(&mut out.time_s[start..]);
+                }
             }
             out.stretches.push(start..out.time_s.len());
+        };
+        for stretch in joined(recording, encoder, runs) {
+            let stamped = |stretch: &Stretch| stretch.rows().map(|row| recording.time_s[row]).collect::<Vec<_>>();
+            match stretch.times(&recording.time_s, &encoder.values) {
+                Some(times) => take(&stretch, &times, true),
+                // Rows that lie as they are stamped are read off between them, and nothing reaches across a hole.
+                None => stretch.alone().for_each(|run| {
+                    let times = stamped(&run);
+                    take(&run, &times, are_even(&times, 0.02));
+                }),
+            }
         }
         out.torque_step = undithered_step(&out.torque);
         out.position_grid = statistics::grid(&out.position).unwrap_or(0.0);
         out.table_grid = out.table.as_deref().and_then(statistics::grid).unwrap_or(0.0);
+        out.fill_holes();
         Ok(out)
+    }
+
+    /// Fills in what is missing, and remembers where.
+    fn fill_holes(&mut self) {
+        let finite = |values: &[f64], row: usize| values[row].is_finite();
+        let whole = |row: usize| {
+            let table = self.table.as_deref().is_none_or(|table| finite(table, row));
+            table && finite(&self.position, row) && finite(&self.torque, row)
+        };
+        self.known = (0..self.time_s.len()).map(whole).collect();
+        if self.known.iter().all(|known| *known) {
+            return;
+        }
+        let torque_grid = statistics::grid(&self.torque).unwrap_or(0.0);
+        for s in self.stretches.clone() {
+            if self.known[s.clone()].iter().all(|known| *known) {
+                continue;
+            }
+            let apart = self.table.as_ref().map(|table| {
+                let mut apart: Vec<f64> = s.clone().map(|row| table[row] - self.position[row]).collect();
+                fill_straight(&mut apart);
+                apart
+            });
+            fill_smooth(&mut self.position[s.clone()], self.position_grid);
+            fill_straight(&mut self.torque[s.clone()]);
+            for (row, apart) in s.clone().zip(apart.into_iter().flatten()) {
+                if let Some(table) = self.table.as_mut().filter(|table| !table[row].is_finite()) {
+                    table[row] = on(self.position[row] + apart, self.table_grid);
+                }
+            }
+            for row in s.filter(|row| !self.known[*row]) {
+                self.torque[row] = on(self.torque[row], torque_grid);
+            }
+        }
     }
 
     /// What a reader must know of the rows of a recording that are not among these, or not as they were recorded.
@@ -120,7 +176,9 @@ impl Columns {
     /// The same columns as the simulation sees a recording; `None` where no stretch is long enough for a motion.
     #[must_use]
     pub fn observed(&self) -> Option<Observed> {
-        let copy = Columns::clone(self);
+        let mut copy = Columns::clone(self);
+        let rows = copy.torque.iter_mut().zip(&self.known);
+        rows.filter(|(_, known)| !**known).for_each(|(torque, _)| *torque = f64::NAN);
         Observed::from_columns(copy.time_s, copy.position, copy.torque, copy.command, copy.table, copy.stretches)
     }
 
@@ -152,7 +210,11 @@ impl Columns {
             };
             self.stretches.iter().flat_map(of).collect()
         };
+        let whole = |s: &Range<usize>| {
+            self.known[s.clone()].chunks_exact(many).map(|c| c.iter().all(|known| *known)).collect::<Vec<_>>()
+        };
         Columns {
+            known: self.stretches.iter().flat_map(whole).collect(),
             time_s: mean(&self.time_s),
             position: mean(&self.position),
             torque: mean(&self.torque),
@@ -214,6 +276,11 @@ fn undithered_step(values: &[f64]) -> f64 {
     if noise < 0.5 * grid { grid } else { 0.0 }
 }
 
+/// The nearest value on a grid, where there is one.
+fn on(value: f64, grid: f64) -> f64 {
+    if grid > 0.0 { (value / grid).round() * grid } else { value }
+}
+
 fn even_times(times: &[f64], period_s: f64) -> Vec<f64> {
     let (Some(first), Some(last)) = (times.first(), times.last()) else { return Vec::new() };
     let count = ((last - first) / period_s).floor() as usize + 1;
@@ -266,6 +333,7 @@ mod tests {
             time_s: rows.iter().map(|i| i * 2.5e-4).collect(),
             position: rows.iter().map(|i| 1e3 + i * 0.5).collect(),
             torque: rows.clone(),
+            known: (0..1003).map(|row| row != 402).collect(),
             command: None,
             table: None,
             stretches: vec![0..402, 402..1000, 1000..1003],
@@ -278,6 +346,7 @@ mod tests {
         };
         let thin = columns.thinned();
         assert_eq!((thin.stretches.clone(), thin.period_s, thin.torque.len()), (vec![0..100, 100..249], 1e-3, 249));
+        assert_eq!(thin.known.iter().position(|known| !known), Some(100));
         for ((t, x), torque) in thin.time_s.iter().zip(&thin.position).zip(&thin.torque) {
             assert!((t / 2.5e-4 - torque).abs() < 1e-9 && ((x - 1e3) / 0.5 - torque).abs() < 1e-9);
         }

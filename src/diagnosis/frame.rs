@@ -10,7 +10,7 @@
 use super::filter::{LowPass, convolve, norm, of_three};
 use super::grids;
 use super::many::{decay, product, to_the_power, widest};
-use super::rows::{direction_of, doubtful_rows, judged_rows, resting_rows};
+use super::rows::{beside_filled, direction_of, doubtful_rows, judged_rows, resting_rows};
 use super::sampling::{NUMEROV, Sampling};
 use crate::machine::{Axis, Belief, Effect};
 use crate::plant::lateness::Lateness;
@@ -30,7 +30,9 @@ pub struct Columns {
     pub command: Option<Vec<f64>>,
     /// Load-side scale, load units, where recorded.
     pub table: Option<Vec<f64>>,
-    /// Stretches of whole rows without gaps.
+    /// Which rows are as recorded; the others are filled in by those beside them.
+    pub known: Vec<bool>,
+    /// Stretches of rows without gaps.
     pub stretches: Vec<Range<usize>>,
     /// The torque's grid where its noise does not carry it over the steps, so that a mean of rows is no finer than one; else 0.
     pub torque_step: f64,
@@ -162,7 +164,9 @@ impl<'a> Frame<'a> {
         };
         // Room for the filter and for reading between rows.
         let margin = low_pass.reach() + 5;
-        let kept = judged_rows(columns, margin, low_pass.width / 2 + 1, |row| weight_of(row) > LEAST_WEIGHT);
+        let filled = beside_filled(columns, margin);
+        let carries = |row: usize| !filled[row] && weight_of(row) > LEAST_WEIGHT;
+        let kept = judged_rows(columns, margin, low_pass.width / 2 + 1, carries);
         let mut weights: Vec<f64> = kept.iter().map(|&row| weight_of(row)).collect();
         let mean = (weights.iter().map(|w| w * w).sum::<f64>() / weights.len().max(1) as f64).sqrt();
         weights.iter_mut().for_each(|w| *w /= mean.max(LEAST_WEIGHT));

@@ -33,6 +33,7 @@ mod rows;
 pub mod sampling;
 pub mod select;
 pub mod show;
+mod stretches;
 pub mod uncertainty;
 pub mod verdict;
 

@@ -88,6 +88,16 @@ fn first_known(columns: &Columns, stretch: &Range<usize>, stroke: f64) -> usize 
     away + (SETTLED_S / columns.period_s).ceil() as usize
 }
 
+/// Rows within so many of one that is not as recorded.
+pub fn beside_filled(columns: &Columns, margin: usize) -> Vec<bool> {
+    let mut beside = vec![false; columns.known.len()];
+    for row in (0..columns.known.len()).filter(|row| !columns.known[*row]) {
+        let end = (row + margin + 1).min(beside.len());
+        beside[row.saturating_sub(margin)..end].fill(true);
+    }
+    beside
+}
+
 /// Rows away from the ends of their stretch, thinned to the filter's own density, that carry weight.
 pub fn judged_rows(columns: &Columns, margin: usize, stride: usize, carries: impl Fn(usize) -> bool) -> Vec<usize> {
     let mut kept = Vec::new();

@@ -16,3 +16,4 @@ pub mod physics;
 pub mod predict;
 pub mod servo;
 pub mod simulate;
+pub mod stamps;

@@ -7,6 +7,7 @@
 //! forward-backward filtering*, 1996.)
 
 use super::linear::rms;
+use super::stamps::are_even;
 use realfft::RealFftPlanner;
 use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
@@ -99,50 +100,6 @@ impl Motion {
         let square: f64 = position.iter().zip(&smooth).map(|(raw, s)| (raw - s) * (raw - s)).sum();
         Some(Motion { position: smooth, velocity, acceleration, cutoff_hz, resolution: (square / n as f64).sqrt() })
     }
-}
-
-/// Whether rows are equidistant to a share of their period.
-#[must_use]
-pub fn are_even(time_s: &[f64], share: f64) -> bool {
-    let (Some(first), Some(last)) = (time_s.first(), time_s.last()) else { return true };
-    let period = (last - first) / (time_s.len() - 1).max(1) as f64;
-    time_s.iter().enumerate().all(|(i, t)| (t - first - i as f64 * period).abs() <= share * period)
-}
-
-/// When the rows of one stretch were taken, s. A time that is written when a row is stored may scatter, while a servo takes rows
-/// evenly; another recorder takes them when it says. The motion tells: at the right times it is smoother, each row nearer to
-/// the cubic through its neighbours. Where that makes no difference, rows are even: the line of least squares through times.
-#[must_use]
-pub fn times_of_rows<'t>(time_s: &'t [f64], position: &[f64]) -> Cow<'t, [f64]> {
-    let n = time_s.len();
-    if n < FEWEST_ROWS || are_even(time_s, 1e-3) {
-        return Cow::Borrowed(time_s);
-    }
-    let (mut stamped, mut even) = (0.0, 0.0);
-    for (t, x) in time_s.windows(5).zip(position.windows(5)) {
-        stamped += beside_cubic([t[0], t[1], t[2], t[3], t[4]], x).powi(2);
-        even += beside_cubic([0.0, 1.0, 2.0, 3.0, 4.0], x).powi(2);
-    }
-    if stamped < even {
-        return Cow::Borrowed(time_s);
-    }
-    let middle = 0.5 * (n - 1) as f64;
-    let mean = time_s.iter().map(|t| t - time_s[0]).sum::<f64>() / n as f64;
-    let along: f64 = time_s.iter().enumerate().map(|(i, t)| (i as f64 - middle) * (t - time_s[0])).sum();
-    let period = along / (middle * (middle + 1.0) * n as f64 / 3.0);
-    (0..n).map(|i| time_s[0] + mean + (i as f64 - middle) * period).collect()
-}
-
-/// How far the middle one of five rows is from the cubic through the others.
-fn beside_cubic(t: [f64; 5], x: &[f64]) -> f64 {
-    let weight = |k: usize| -> f64 {
-        [0, 1, 3, 4]
-            .into_iter()
-            .filter(|&other| other != k)
-            .map(|other| (t[2] - t[other]) / (t[k] - t[other]))
-            .product()
-    };
-    x[2] - [0, 1, 3, 4].into_iter().map(|k| weight(k) * x[k]).sum::<f64>()
 }
 
 /// Linear interpolation onto a regular grid of as many rows over the same time.
@@ -400,22 +357,6 @@ mod tests {
     }
 
     /// Rows of a swing, taken or only written at scattered times: told by the motion, however it scatters.
-    #[test]
-    fn the_motion_tells_when_rows_were_taken() {
-        let scatter = noise(5000);
-        let even: Vec<f64> = (0..5000).map(|i| i as f64 * 1e-3).collect();
-        for share in [0.004, 0.03, 0.3] {
-            let written: Vec<f64> = even.iter().zip(&scatter).map(|(t, e)| t + share * 1e-3 * e).collect();
-            let swing = |times: &[f64]| -> Vec<f64> { times.iter().map(|t| 10.0 * (TAU * 1.5 * t).sin()).collect() };
-            assert_eq!(*times_of_rows(&written, &swing(&written)), *written);
-            let found = times_of_rows(&written, &swing(&even));
-            assert!(are_even(&found, 1e-9) && found.iter().zip(&even).all(|(f, t)| (f - t).abs() < share * 1e-4));
-            // At rest nobody can tell, and nothing depends on it.
-            assert!(are_even(&times_of_rows(&written, &[3.0; 5000]), 1e-9));
-        }
-    }
-
-    /// The cut-off found is close to the best one, on a motion whose acceleration is known and whatever the noise.
     #[test]
     fn the_cutoff_found_is_near_the_best() {
         let n = 20_000;

@@ -1,6 +1,7 @@
 //! One axis of a recording in the units of the model, with its motion worked out once.
 
-use super::motion::{FEWEST_ROWS, Motion, times_of_rows};
+use super::motion::{FEWEST_ROWS, Motion};
+use super::stamps::times_of_rows;
 use crate::machine::Axis;
 use crate::recording::{Recording, RecordingError, Signal, Unit};
 use std::borrow::Cow;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Column, Name, Recording, RecordingError, Sampling, Unit, file_row};
+use super::{Column, Hole, Name, Recording, RecordingError, Sampling, Unit, file_row};
 
 /// What kind of irregularity was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -71,8 +71,8 @@ pub(super) fn checked(file: &str, mut time_s: Vec<f64>, mut columns: Vec<Column>
         };
         return Err(RecordingError::new(file, format!("has {found}")));
     }
-    let sampling = Sampling::of(&time_s);
-    issues.extend(timing(&time_s, &sampling));
+    let (sampling, holes) = Sampling::of(&time_s);
+    issues.extend(timing(&time_s, &sampling, &holes));
     for column in &mut columns {
         issues.extend(name(column));
         issues.extend(not_finite(column));
@@ -80,7 +80,7 @@ pub(super) fn checked(file: &str, mut time_s: Vec<f64>, mut columns: Vec<Column>
             issues.extend(breaks(column));
         }
     }
-    Ok(Recording { file: file.to_owned(), time_s, columns, sampling, issues })
+    Ok(Recording { file: file.to_owned(), time_s, columns, sampling, holes, issues })
 }
 
 fn same_length(file: &str, time_s: &[f64], columns: &[Column]) -> Result<(), RecordingError> {
@@ -159,20 +159,17 @@ fn drop_repeats(file: &str, time_s: &mut Vec<f64>, columns: &mut [Column]) -> Re
     }))
 }
 
-fn timing(time_s: &[f64], sampling: &Sampling) -> Vec<Issue> {
+fn timing(time_s: &[f64], sampling: &Sampling, holes: &[Hole]) -> Vec<Issue> {
     let mut issues = Vec::new();
-    let is_gap = |row: &usize| time_s[*row] - time_s[*row - 1] > sampling.gap_s;
-    if let Some(first) = (1..time_s.len()).find(is_gap) {
-        let missing = (time_s[first] - time_s[first - 1]) / sampling.period_s - 1.0;
+    if let Some(&Hole { row: first, missing }) = holes.first() {
+        let by_time = (time_s[first] - time_s[first - 1]) / sampling.period_s - 1.0;
+        let missing = if missing > 0 { missing as f64 } else { by_time };
         issues.push(Issue {
             kind: IssueKind::Gap,
             row: Some(file_row(first)),
             column: Some("time_s".into()),
             count: sampling.gaps,
-            message: format!(
-                "rows are missing: {missing:.0} of them before {} s; no analysis reaches across a gap",
-                time_s[first]
-            ),
+            message: format!("rows are missing: {missing:.0} of them before {} s", time_s[first]),
         });
     }
     if !sampling.regular {

@@ -25,7 +25,7 @@ use std::path::Path;
 pub use check::{Issue, IssueKind};
 pub use error::RecordingError;
 pub use label::{Label, Name, Signal, Unit};
-pub use sampling::Sampling;
+pub use sampling::{Hole, Sampling};
 
 /// One column: its header, what it means, and its values in the unit of its name.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,6 +80,8 @@ pub struct Recording {
     pub columns: Vec<Column>,
     /// How the rows lie in time.
     pub sampling: Sampling,
+    /// Where rows are missing, in order.
+    pub holes: Vec<Hole>,
     /// What was found and worked around.
     pub issues: Vec<Issue>,
 }
@@ -232,9 +234,11 @@ impl Recording {
                 runs.push(start..end);
             }
         };
+        let mut next = self.holes.iter().map(|hole| hole.row).peekable();
         for row in 0..self.rows() {
             let finite = finite(columns, row);
-            if !finite || self.breaks_at(columns, row, self.sampling.gap_s) {
+            let hole = next.next_if_eq(&row).is_some();
+            if !finite || hole || columns.iter().any(|column| column.breaks.binary_search(&row).is_ok()) {
                 close(start, row);
                 start = if finite { row } else { row + 1 };
             }
@@ -263,11 +267,6 @@ impl Recording {
         }
         pieces.retain(|piece| piece.len() >= 2);
         pieces
-    }
-
-    fn breaks_at(&self, columns: &[&Column], row: usize, longest_s: f64) -> bool {
-        row > 0 && self.time_s[row] - self.time_s[row - 1] > longest_s
-            || columns.iter().any(|column| column.breaks.binary_search(&row).is_ok())
     }
 }
 
