@@ -2,7 +2,7 @@
 //! data where they are at hand.
 
 use gib::diagnosis::{Diagnosis, Stopped, Verdict, diagnose};
-use gib::machine::{Axis, Cause, Machine};
+use gib::machine::{Axis, Cause, Effect, Machine};
 use gib::recording::{Column, Recording};
 use std::f64::consts::TAU;
 use std::path::PathBuf;
@@ -94,6 +94,19 @@ fn each_law_is_found_under_its_own_name() {
         0.1,
         &recording(|_, x, v, _| 0.2 * v.signum() * (-((x - 120.0) / 9.0).powi(2)).exp()),
     );
+}
+
+#[test]
+fn a_drift_slower_than_the_recording_is_named_and_its_end_is_not_known() {
+    for most in [0.1, 0.5] {
+        let found = judged(&recording(|t, _, v, _| most * (1.0 - t / 30.0) * v.signum()));
+        let [finding] = found.findings.as_slice() else { panic!("{found:?}") };
+        let Effect::ThermalDrift { drop, time_constant_s, until_s } = finding.effect else { panic!("{finding:?}") };
+        assert!((drop / most - 1.0).abs() < 0.05 && (until_s - 30.0).abs() < 0.1, "{finding:?}");
+        // Any longer one would do as well.
+        assert!(time_constant_s > 60.0 && finding.deviations[1] > 0.5 * time_constant_s, "{finding:?}");
+        assert!(found.gains[0].after < 0.4 * found.gains[0].before, "{found:?}");
+    }
 }
 
 #[test]

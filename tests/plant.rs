@@ -213,7 +213,7 @@ fn every_cause_of_torque_is_predicted() {
         Effect::PositionDependentFriction { centre_mm: 110.0, peak: 0.5, width_mm: 25.0, steepness: 2.0 },
         Effect::CableForce { slope: 0.004, zero_mm: 100.0 },
         Effect::QuadraticDrag { drag: 8.0 },
-        Effect::ThermalDrift { drop: 0.4, time_constant_s: 25.0 },
+        Effect::ThermalDrift { drop: 0.4, time_constant_s: 25.0, until_s: 1e9 },
         Effect::DeadTime { delay_ms: 4.0 },
         Effect::ExternalVibration { frequency_hz: 7.3, amplitude: 0.12 },
         Effect::TorqueSaturation { limit: 1.5, slope_ratio: 0.5 },

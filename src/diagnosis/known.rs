@@ -88,7 +88,9 @@ fn by_its_law(frame: &Frame, effect: &Effect) -> Option<(Vec<f64>, Vec<f64>)> {
         }
         CableForce { slope, zero_mm } => (vec![1.0], vec![slope, -slope * zero_mm]),
         QuadraticDrag { drag } => (vec![], vec![drag]),
-        ThermalDrift { drop, time_constant_s } => (vec![time_constant_s / seconds], vec![drop]),
+        ThermalDrift { drop, time_constant_s, until_s } => {
+            (vec![time_constant_s / seconds, until_s / seconds], vec![drop])
+        }
         ExternalVibration { frequency_hz, amplitude } => (vec![frequency_hz * seconds], vec![amplitude]),
         TorqueSaturation { limit, slope_ratio } => (vec![limit / peak()], vec![1.0 - slope_ratio]),
         ScrewPitchError { scale_um_m } => (vec![], vec![scale_um_m]),

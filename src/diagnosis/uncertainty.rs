@@ -8,6 +8,7 @@
 //! blocks effectively take part (Imbens and Kolesár 2016).
 
 use super::blocks;
+use super::causes::thermal_drift::SLOWEST;
 use super::fit::{Bench, Fit, Part, Slope, pseudo_inverse};
 use super::many::dot;
 use crate::machine::{Cause, Effect};
@@ -130,6 +131,13 @@ pub fn effects(bench: &Bench, fit: &Fit) -> Vec<Option<(Effect, Vec<f64>)>> {
             let mut deviations: Vec<f64> = (0..values.len()).map(deviation).collect();
             if let (Effect::DeadTime { .. }, [deviation]) = (effect, deviations.as_mut_slice()) {
                 *deviation = deviation.hypot(1e3 * bench.frame.sampling.deviation_s());
+            }
+            // At its bound a time constant may be any longer one.
+            if let (Effect::ThermalDrift { time_constant_s, .. }, [_, deviation, _]) =
+                (effect, deviations.as_mut_slice())
+                && part.shape[0] >= 0.999 * SLOWEST
+            {
+                *deviation = time_constant_s;
             }
             Some((effect, deviations))
         })

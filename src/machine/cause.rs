@@ -205,12 +205,15 @@ vocabulary! {
         /// N·m·s²/m² or N·s²/m².
         drag: "drag_nm_s2_m2", "drag_n_s2_m2", "", -HUGE, HUGE;
     }
-    /// drop·exp(−t/τ)·sign(v), t from the recording's first row.
+    /// drop·(exp(−t/τ) − w)/(1 − w)·sign(v) with w = exp(−until/τ), t from the recording's first row: what is gone at last, or at
+    /// a time before.
     ThermalDrift "thermal_drift" once "friction decays as the machine warms" {
         /// Friction that has gone once warm, N·m or N.
         drop: "drop_nm", "drop_n", "", -HUGE, HUGE;
         /// τ.
         time_constant_s: "time_constant_s", "time_constant_s", "", TINY, HUGE;
+        /// When that has gone, s; the friction goes on falling. At last, as a rule.
+        until_s: "until_s", "until_s", "", TINY, HUGE, = HUGE;
     }
     /// The torque column is late against the position column by this much (early where negative).
     DeadTime "dead_time" once "torque and position columns are not of one instant" {

@@ -116,7 +116,8 @@ pub struct Physics {
     constant: f64,
     stribeck: Option<Stribeck>,
     pub(super) spots: Vec<Spot>,
-    drift: Option<(f64, f64)>,
+    /// Drop, rate, and what is left of it when it counts as gone.
+    drift: Option<(f64, f64, f64)>,
     cable: Option<(f64, f64)>,
     drag: f64,
     saturation: Option<(f64, f64)>,
@@ -179,7 +180,11 @@ impl Physics {
                 Effect::CableForce { slope, zero_mm } => p.cable = Some((slope, zero_mm)),
                 // v in m/s is 1e-3 of v in mm/s.
                 Effect::QuadraticDrag { drag } => p.drag = drag * 1e-6,
-                Effect::ThermalDrift { drop, time_constant_s } => p.drift = Some((drop, 1.0 / time_constant_s)),
+                Effect::ThermalDrift { drop, time_constant_s, until_s } => {
+                    let left = (-until_s / time_constant_s).exp();
+                    let all = drop / (1.0 - left);
+                    p.drift = Some((all, 1.0 / time_constant_s, all * left));
+                }
                 Effect::DeadTime { delay_ms } => p.delay_s = delay_ms * 1e-3,
                 Effect::ExternalVibration { frequency_hz, amplitude } => {
                     p.vibration.push(ripple(amplitude, TAU * frequency_hz));
@@ -219,8 +224,8 @@ impl Physics {
         for spot in spots {
             level += spot;
         }
-        if let Some((drop, per_time)) = self.drift {
-            level += drop * with_time(t * per_time);
+        if let Some((drop, per_time, left)) = self.drift {
+            level += drop * with_time(t * per_time) - left;
         }
         level.max(0.0)
     }
@@ -369,6 +374,9 @@ mod tests {
         near(p.friction_level(93.0, 1.0, 0.0), 0.5 + 0.3 * e);
         let p = physics(r#"{"cause":"thermal_drift","parameters":{"drop_nm":0.3,"time_constant_s":20}}"#);
         near(p.friction_level(0.0, 1.0, 20.0), 0.5 + 0.3 * e);
+        let p = physics(r#"{"cause":"thermal_drift","parameters":{"drop_nm":0.3,"time_constant_s":20,"until_s":20}}"#);
+        near(p.friction_level(0.0, 1.0, 0.0), 0.5 + 0.3);
+        near(p.friction_level(0.0, 1.0, 20.0), 0.5);
         let p = physics(r#"{"cause":"direction_dependent_friction","parameters":{"asymmetry_nm_s":0.004}}"#);
         near(p.slope_friction(10.0), 0.14);
         near(p.slope_friction(-10.0), -0.06);

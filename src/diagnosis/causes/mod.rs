@@ -17,13 +17,13 @@ mod quadratic_drag;
 mod screw_periodic_error;
 mod screw_pitch_error;
 mod stribeck_friction;
-mod thermal_drift;
 mod torque_saturation;
 mod viscous_friction_mismatch;
 
 pub(super) mod periods;
 pub(super) mod presliding_friction;
 pub(super) mod table_side;
+pub(super) mod thermal_drift;
 
 use super::frame::Frame;
 use crate::machine::{Axis, Cause, Effect};
