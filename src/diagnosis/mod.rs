@@ -28,6 +28,7 @@ mod json;
 mod judge;
 mod known;
 mod many;
+mod narrow;
 pub mod progress;
 mod rows;
 pub mod sampling;

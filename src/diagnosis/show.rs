@@ -108,7 +108,13 @@ pub fn against_all(frame: &Frame, before: &[f64], after: &[f64]) -> Vec<View> {
 #[must_use]
 pub fn share_along(bench: &Bench, fit: &Fit, coordinate: Coordinate) -> f64 {
     let [rest, _] = bench.rest(fit);
-    Groups::of(&places(bench.frame, coordinate), &rest).share()
+    share_of(bench.frame, &rest, coordinate)
+}
+
+/// The same of values at the judged rows.
+#[must_use]
+pub fn share_of(frame: &Frame, values: &[f64], coordinate: Coordinate) -> f64 {
+    Groups::of(&places(frame, coordinate), values).share()
 }
 
 /// Where the judged rows are along a coordinate: distance since reversal by its logarithm, frequency nowhere.

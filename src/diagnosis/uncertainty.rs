@@ -255,7 +255,8 @@ impl Spread {
 
 /// Half-width of Student's central 95 % over that of the normal distribution, by Fisher's expansion; fewer than two degrees
 /// of freedom count as two.
-fn widening(freedom: f64) -> f64 {
+#[must_use]
+pub fn widening(freedom: f64) -> f64 {
     let v = freedom.max(2.0);
     1.0 + (2.372 + (2.823 + 2.555 / v) / v) / v / 1.96
 }

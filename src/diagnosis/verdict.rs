@@ -10,6 +10,7 @@ use super::frame::{Columns, Frame};
 use super::gain::{self, Gain, Holdout};
 use super::judge::{Excess, Judge, Judged, refutation, refuted, rms, shows};
 use super::known;
+use super::narrow::{self, Band};
 use super::progress::{Progress, Stopped, Watch};
 use super::select::{Search, Selection};
 use super::show::{self, View};
@@ -147,22 +148,43 @@ struct Recorded<'d> {
 }
 
 /// The answer on one system of equations; on aligned ones where the torque column turns out to be late by its sampling.
-fn answer(recorded: &Recorded, frame: &Frame, mut notes: Vec<String>) -> Result<Diagnosis, Stopped> {
+fn answer(recorded: &Recorded, frame: &Frame, notes: Vec<String>) -> Result<Diagnosis, Stopped> {
+    let bench = Bench::new(frame, &known::trace(recorded.axis, frame));
+    let found = answer_on(recorded, &bench, None, notes.clone())?;
+    let open = matches!(found.verdict, Verdict::UnknownCause | Verdict::PartlyExplained);
+    if let Some(band) = open.then(|| narrow::band(&bench)).flatten() {
+        let beside = bench.beside_lines(&band.columns);
+        let again = answer_on(recorded, &beside, Some(&band), notes)?;
+        let named = matches!(again.verdict, Verdict::Explained | Verdict::PartlyExplained);
+        if named && again.unexplained.torque.rms < found.unexplained.torque.rms {
+            return Ok(again);
+        }
+    }
+    Ok(found)
+}
+
+/// The answer on these equations, beside a vibration that they leave free.
+fn answer_on(
+    recorded: &Recorded,
+    bench: &Bench,
+    vibration: Option<&Band>,
+    mut notes: Vec<String>,
+) -> Result<Diagnosis, Stopped> {
     let &Recorded { axis, whole, holdout, watch } = recorded;
-    let bench = Bench::new(frame, &known::trace(axis, frame));
+    let frame = bench.frame;
     let empty = bench.fit(Vec::new());
     let laws: Vec<&'static Law> = LAWS.iter().copied().filter(|law| belief::may_be_found(axis, law.cause)).collect();
-    let judge = || Ok(Judge::new(axis, whole, &bench, watch));
-    let (judge, search) = watch.both(judge, || Search::new(&bench, &laws, watch))?;
+    let judge = || Ok(Judge::new(axis, whole, bench, watch));
+    let (judge, search) = watch.both(judge, || Search::new(bench, &laws, watch))?;
     let found = search.from_belief()?;
-    if let Some(late_s) = uncertainty::late_by_sampling(&bench, &found.fit) {
+    if let Some(late_s) = uncertainty::late_by_sampling(bench, &found.fit) {
         return aligned(recorded, frame, late_s, notes);
     }
     let mut judged = judge.judge(found)?;
     if judged.verdict == Verdict::UnknownCause {
         // Of several numbers of the belief that are wrong together none shows the way by itself.
         let found = search.from_open_belief()?;
-        if let Some(late_s) = uncertainty::late_by_sampling(&bench, &found.fit) {
+        if let Some(late_s) = uncertainty::late_by_sampling(bench, &found.fit) {
             return aligned(recorded, frame, late_s, notes);
         }
         let again = judge.judge(found)?;
@@ -173,7 +195,7 @@ fn answer(recorded: &Recorded, frame: &Frame, mut notes: Vec<String>) -> Result<
         }
     }
     notes.extend(judged.refutation.take());
-    let mut findings = findings(axis, &bench, &judged.selection, &empty);
+    let mut findings = findings(axis, bench, &judged.selection, &empty);
     let mut extended = extended_by(axis, &findings);
     if let Some(holdout) = holdout {
         match Columns::of(holdout, axis).map(|columns| (columns.notes(holdout, axis), Holdout::new(axis, columns))) {
@@ -198,12 +220,34 @@ fn answer(recorded: &Recorded, frame: &Frame, mut notes: Vec<String>) -> Result<
             }
         }
     }
-    let Judged { verdict, selection: Selection { fit, .. }, gains, .. } = judged;
+    let Judged { mut verdict, selection: Selection { fit, .. }, gains, .. } = judged;
     notes.extend(nameless(frame, &fit));
-    let shown = show::views(&bench, &empty, &fit);
-    let unexplained = unexplained(&bench, &fit, &shown);
+    if let Some(band) = vibration {
+        verdict = band.beside(bench, verdict, &fit);
+        notes.push(join(band, &mut findings, axis, &fit));
+    }
+    let shown = show::views(bench, vibration.map_or(&empty, |band| &band.before), &fit);
+    let unexplained = unexplained(bench, &fit, &shown);
     watch.at(1.0, "done")?;
     Ok(Diagnosis { verdict, findings, gains, unexplained, shown, missing: Vec::new(), notes, extended })
+}
+
+/// Puts a vibration among what was found beside it, largest share first, and says what a machine file cannot have of it.
+fn join(band: &Band, findings: &mut Vec<Finding>, axis: &Axis, fit: &Fit) -> String {
+    let all = band.before.squares();
+    let rest = band.after.squares() / all;
+    findings.iter_mut().for_each(|finding| finding.share *= rest);
+    findings.push(Finding {
+        effect: band.effect,
+        deviations: band.deviations.clone(),
+        confidence: 0.9999,
+        share: (1.0 - fit.squares() / all - findings.iter().map(|f| f.share).sum::<f64>()).clamp(0.0, 1.0),
+        evidence: (law(Cause::ExternalVibration).sentence)(&band.effect, axis),
+        indistinguishable_from: Vec::new(),
+        next_experiment: None,
+    });
+    findings.sort_by(|a, b| b.share.total_cmp(&a.share));
+    "the vibration comes and goes with a phase of its own, which no machine file repeats: it is not in the extended machine".to_owned()
 }
 
 /// The answer with the torque column moved up by what its sampling may have made it late.

@@ -10,6 +10,8 @@ use realfft::RealFftPlanner;
 const STROKE_BINS: [usize; 2] = [1 << 14, 1 << 17];
 /// Starts handed on from each octave.
 const MOST: usize = 2;
+/// Steps in time that a recording with long gaps may be laid out on in any case.
+const MOST_STEPS: usize = 1 << 22;
 /// Least share of the rest's squares that a peak explains by its height. A cause needs eight times as much to be named, and
 /// the raster of bins and frequencies costs a peak a quarter at most.
 const LEAST_SHARE: f64 = 0.01;
@@ -106,11 +108,37 @@ fn is_in_each(pieces: f64, along: impl Fn(usize) -> f64, frame: &Frame, ripple: 
     })
 }
 
+/// Whether a ripple is there alike in groups of as many rows each along a coordinate.
+pub fn there_alike(frame: &Frame, along: impl Fn(usize) -> f64, groups: usize, ripple: &[f64], left: &[f64]) -> bool {
+    let mut order: Vec<f64> = frame.kept.iter().map(|&row| along(row)).collect();
+    order.sort_unstable_by(f64::total_cmp);
+    let rank = |row: usize| order.partition_point(|other| *other < along(row)) as f64 / order.len() as f64;
+    is_in_each(groups as f64, rank, frame, ripple, left)
+}
+
+/// The frequency, Hz, about which most of the rest's power lies within so many periods over the recording to either side.
+pub fn strongest_band(frame: &Frame, rest: &[f64], reach: f64) -> Option<f64> {
+    let (mut bins, stride) = rows_in_time(frame, rest)?;
+    let length = bins.len() as f64;
+    let cycles = frame.seconds(frame.x.len() - 1) / (stride as f64 * frame.columns.period_s) / length;
+    let reach = (reach / cycles).ceil() as usize;
+    let (from, to) = ((10.0 / cycles) as usize + reach, (length * visible(frame, stride)) as usize);
+    let power = power(&mut bins);
+    let mut sums = vec![0.0; power.len() + 1];
+    power.iter().enumerate().for_each(|(i, power)| sums[i + 1] = sums[i] + power);
+    let within = |at: usize| sums[at + reach + 1] - sums[at - reach];
+    let places = from..to.min(power.len().saturating_sub(reach + 1));
+    let strongest = places.max_by(|a, b| within(*a).total_cmp(&within(*b)))?;
+    let near = strongest - reach..=strongest + reach;
+    let middle = near.map(|i| i as f64 * power[i]).sum::<f64>() / within(strongest).max(1e-300);
+    Some(middle / (length * stride as f64 * frame.columns.period_s))
+}
+
 /// Numbers of periods over the recording at which the rest repeats most.
 pub fn along_time(frame: &Frame, rest: &[f64]) -> Vec<Vec<f64>> {
     let Some((mut bins, stride)) = rows_in_time(frame, rest) else { return Vec::new() };
     let length = bins.len() as f64;
-    let cycles = (frame.x.len() - 1) as f64 / stride as f64 / length;
+    let cycles = frame.seconds(frame.x.len() - 1) / (stride as f64 * frame.columns.period_s) / length;
     // Ten periods at least.
     let range = ((10.0 / cycles) as usize, (length * visible(frame, stride)) as usize);
     peaks(&mut bins, range, cycles, least_power(rest))
@@ -138,13 +166,15 @@ pub fn spectrum(frame: &Frame, rest: &[f64]) -> Vec<(f64, f64)> {
 /// The rest on an even raster in time, padded to twice its length, and the rows of its step.
 fn rows_in_time(frame: &Frame, rest: &[f64]) -> Option<(Vec<f64>, usize)> {
     let stride = frame.kept.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(1).max(1);
-    let rows = frame.x.len() / stride + 1;
-    if rows < 64 {
+    // By time: rows that are missing would turn the phase of all that comes after them.
+    let per_second = 1.0 / (stride as f64 * frame.columns.period_s);
+    let steps = (frame.seconds(frame.x.len().checked_sub(1)?) * per_second) as usize + 1;
+    if steps < 64 || steps > MOST_STEPS.max(16 * frame.x.len()) {
         return None;
     }
-    let mut bins = vec![0.0; (2 * rows).next_power_of_two()];
+    let mut bins = vec![0.0; (2 * steps).next_power_of_two()];
     for (&row, value) in frame.kept.iter().zip(rest) {
-        if let Some(bin) = bins.get_mut(row / stride) {
+        if let Some(bin) = bins.get_mut((frame.seconds(row) * per_second + 1e-6) as usize) {
             *bin += value;
         }
     }

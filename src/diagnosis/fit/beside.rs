@@ -1,7 +1,7 @@
 //! The same equations beside columns that are free in every fit: what those explain is taken off the measurement and off every
 //! trace, and what is left is fitted as if they were not there (Frisch and Waugh 1933, Lovell 1963).
 
-use super::{Bench, Fit, Part, add, dot, orthonormal};
+use super::{Bench, Fit, Part, add, dot, orthonormal, project};
 use std::sync::Arc;
 
 /// Equations beside free columns of the torque.
@@ -26,9 +26,43 @@ impl<'f, 'a> Bench<'f, 'a> {
         }
         let mut measured = self.measured.clone();
         clear(&mut measured, &directions);
-        let (known, free, windows) = (self.known.clone(), self.free.clone(), self.windows.clone());
+        let (known, windows) = (self.known.clone(), self.windows.clone());
+        let mut free = self.free.clone();
+        free.iter_mut().for_each(|column| clear(column, &directions));
+        let free = orthonormalised(free);
         Beside { bench: Self { measured, known, free, windows, ..*self }, directions }
     }
+}
+
+impl Bench<'_, '_> {
+    /// These equations with stacked columns that are free in every fit.
+    #[must_use]
+    pub fn beside_lines(&self, columns: &[Vec<f64>]) -> Self {
+        let free = orthonormalised(self.free.iter().chain(columns).cloned().collect());
+        let (measured, known, windows) = (self.measured.clone(), self.known.clone(), self.windows.clone());
+        Self { measured, known, free, windows, ..*self }
+    }
+
+    /// What these columns together take of the measurement.
+    #[must_use]
+    pub fn sizes_of(&self, columns: &[Vec<f64>]) -> Vec<f64> {
+        project(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>(), &self.free, &self.measured)
+    }
+}
+
+/// Columns made to stand on each other, of unit length; a single one is so already.
+pub(super) fn orthonormalised(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    if columns.len() < 2 {
+        return columns;
+    }
+    let mut out: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
+    for column in &columns {
+        let (direction, weights) = orthonormal(column, &out, &[]);
+        if weights[out.len()] > 0.0 {
+            out.push(direction);
+        }
+    }
+    out
 }
 
 impl Beside<'_, '_> {

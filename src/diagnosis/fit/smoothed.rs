@@ -4,6 +4,7 @@
 //! size. An impact that a law puts some milliseconds off its place is then a small error where it was two large ones, and the
 //! sum of squares falls towards the right parameters from afar (graduated optimisation, Blake and Zisserman 1987).
 
+use super::beside::orthonormalised;
 use super::{Bench, Fit, Part, dot, project};
 use std::ops::Range;
 use std::sync::Arc;
@@ -36,7 +37,7 @@ impl Bench<'_, '_> {
         }
         let sum = |column: &[f64]| summed(column.to_vec(), kept.len(), &windows);
         let (measured, known) = (sum(&self.measured), sum(&self.known));
-        let free = self.free.iter().map(|level| unit(sum(level))).collect();
+        let free = orthonormalised(self.free.iter().map(|column| unit(sum(column))).collect());
         Self { measured, known, free, rows: windows.len(), windows, ..*self }
     }
 
