@@ -329,8 +329,9 @@ fn may_join(set: &Fit, law: &Law) -> bool {
     if law.manner.simulated && set.parts.iter().any(|p| p.law.manner.simulated) {
         return false;
     }
-    // Two tight spots side by side imitate anything along the stroke.
-    same == 0 || law.cause.row().repeatable && same < 2 && law.cause != Cause::PositionDependentFriction
+    // A wave with a harmonic and one more, or one whose size swells and sinks (a line with one on either side). Two tight spots
+    // side by side imitate anything along the stroke.
+    same == 0 || law.cause.row().repeatable && same < 3 && law.cause != Cause::PositionDependentFriction
 }
 
 /// Whether every part lies within its bounds, and ripples of few periods are there once.

@@ -10,7 +10,7 @@ pub static LAW: Law = Law {
     scales: &[Scale::Log(0.02, SLOWEST), Scale::Choice],
     starts: |_, _| {
         let to_the_last = log_spaced(0.04, 2.0, 9).map(|share| vec![share, AT_LAST]);
-        to_the_last.chain([0.75, 1.5, SLOWEST].map(|share| vec![share, 1.0])).collect()
+        to_the_last.chain([vec![SLOWEST, 1.0]]).collect()
     },
     manner: PLAIN,
     terms: |frame, shapes| {
