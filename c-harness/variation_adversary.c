@@ -218,13 +218,13 @@ static void see_answer(variation_adversary *a)
     a->named = a->named == 0 && ends ? a->cycle : a->named;
 }
 
-/* What is asked for and does not change takes effect within ten cycles: the amplitude asked for, or the largest there is. */
+/* What is asked for and does not change takes effect within twenty cycles: the amplitude asked for, or the largest there is. */
 static void see_effect(variation_adversary *a, const gib_speed_variation_input *before)
 {
     gib_speed_variation_config c = a->config;
     gib_speed_variation_limits limits;
     a->steady = memcmp(before, &a->last, sizeof *before) == 0 && a->out.phase == GIB_SPEED_VARIATION_RUNNING ? a->steady + 1 : 0;
-    if (a->steady != 11) {
+    if (a->steady != 21) {
         return;
     }
     c.speed_rpm = a->last.speed_rpm;
@@ -234,7 +234,7 @@ static void see_effect(variation_adversary *a, const gib_speed_variation_input *
     law(a, gib_speed_variation_possible(&c, &limits) == GIB_OK, "limits for what is asked");
     double most = most_of(&c, &limits);
     law(a, fabs(a->out.amplitude_ratio - fmin(c.amplitude_ratio, most)) <= 1e-9 && fabs(a->out.amplitude_limit_ratio - most) <= 1e-9,
-        "an amplitude in effect within ten cycles");
+        "an amplitude in effect within twenty cycles");
 }
 
 /*

@@ -2812,7 +2812,7 @@ typedef struct gib_speed_variation_config {
 #define gib_speed_variation_config_FIRST_SIZE 136
 
 /**
- * What the kernel asks for in a cycle. Values may change in any cycle; a change takes effect within 10 cycles.
+ * What the kernel asks for in a cycle. Values may change in any cycle; a change takes effect within 20 cycles.
  */
 typedef struct gib_speed_variation_input {
     /**
@@ -5976,7 +5976,7 @@ int32_t gib_speed_variation_start(struct gib_speed_variation *handle,
  * It begins and ends at the mean speed without a jump. Mean speed, amplitude, period and cutting torque may change in
  * any cycle; torque, power and speed stay within the motor's. Where more is asked for than it can do, the amplitude
  * is cut to what it can, and `message` says why. What a change leads to is worked out over the cycles that follow, a piece in
- * each: it takes effect within 10 cycles, and until then the variation goes on as before. Cutting torque counts at once.
+ * each: it takes effect within 20 cycles, and until then the variation goes on as before. Cutting torque counts at once.
  *
  * A fault is named in `message` in its cycle; the speed then goes back to its mean as after GIB_SPEED_VARIATION_STOP, with status
  * GIB_BUSY, and only then the error is returned. After a drive fault gib lets go at once.

@@ -9,7 +9,7 @@ before, the spindle goes back to rest.
 
 While \\fBvary\\fR is true, the spindle is at speed and \\fBina\\fR is known, the speed swings by \\fBamplitude\\fR with the
 period \\fBswing-time\\fR, or as far as power and torque allow at that inertia. A stop acts at once, a new speed or an override
-within ten cycles.
+within twenty cycles.
 A parameter left at 0 takes the default of gib_inertia_config or gib_speed_variation_config in gib.h.
 """;
 include "gib.h";

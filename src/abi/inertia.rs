@@ -130,52 +130,35 @@ pub unsafe extern "C" fn gib_inertia_step(
     input: *const InertiaInput,
     output: *mut InertiaOutput,
 ) -> i32 {
-    // SAFETY: the caller promises each is NULL or valid.
-    let (handle, input, output) = unsafe { (handle.as_mut(), input.as_ref(), output.as_mut()) };
-    // Two ways out by turns: checks that lead to one place would be computed and joined, which costs more.
-    let Some(handle) = handle else { return step_refused(None, input, output) };
-    let Some(input) = input else { return step_in_full(Some(handle), None, output) };
-    let Some(output) = output else { return step_refused(Some(handle), Some(input), None) };
+    if handle.is_null() || input.is_null() || output.is_null() {
+        // SAFETY: the caller promises each is NULL or valid.
+        return unsafe { misused(handle.as_ref(), input.as_ref(), output.as_mut()) };
+    }
+    // SAFETY: as above, and none is NULL.
+    let (handle, input, output) = unsafe { (&mut *handle, &*input, &mut *output) };
     if handle.alive == ALIVE && handle.machine.quick(input) {
         let now = handle.machine.output();
         *output = InertiaOutput { speed_command_rpm: now.speed_command_rpm, ..*now };
         return output.status;
     }
-    step_in_full(Some(handle), Some(input), Some(output))
-}
-
-/// A cycle without an instance or an output; `extern "C"` as below.
-#[cold]
-#[inline(never)]
-extern "C" fn step_refused(
-    handle: Option<&mut GibInertia>,
-    input: Option<&InertiaInput>,
-    output: Option<&mut InertiaOutput>,
-) -> i32 {
-    misused(handle, input, output)
+    step_in_full(handle, input, output)
 }
 
 /// A cycle that is not a cheap one. `extern "C"`: it cannot unwind, so that it is called by a jump and the cheap cycle saves
 /// no registers.
 #[inline(never)]
-extern "C" fn step_in_full(
-    handle: Option<&mut GibInertia>,
-    input: Option<&InertiaInput>,
-    output: Option<&mut InertiaOutput>,
-) -> i32 {
-    match (handle, input, output) {
-        (Some(handle), Some(input), Some(output)) if handle.alive == ALIVE => {
-            handle.machine.turn(input);
-            *output = *handle.machine.output();
-            output.status
-        }
-        (handle, input, output) => misused(handle, input, output),
+extern "C" fn step_in_full(handle: &mut GibInertia, input: &InertiaInput, output: &mut InertiaOutput) -> i32 {
+    if handle.alive != ALIVE {
+        return misused(Some(handle), Some(input), Some(output));
     }
+    handle.machine.turn(input);
+    *output = *handle.machine.output();
+    output.status
 }
 
 /// A step without an instance, an input or an output: the speed asked for is the present one.
 #[cold]
-fn misused(handle: Option<&mut GibInertia>, input: Option<&InertiaInput>, output: Option<&mut InertiaOutput>) -> i32 {
+fn misused(handle: Option<&GibInertia>, input: Option<&InertiaInput>, output: Option<&mut InertiaOutput>) -> i32 {
     let status = match &handle {
         Some(handle) if handle.alive != ALIVE => GIB_ERR_HANDLE,
         _ => GIB_ERR_NULL,

@@ -121,7 +121,7 @@ pub unsafe extern "C" fn gib_speed_variation_start(
 /// It begins and ends at the mean speed without a jump. Mean speed, amplitude, period and cutting torque may change in
 /// any cycle; torque, power and speed stay within the motor's. Where more is asked for than it can do, the amplitude
 /// is cut to what it can, and `message` says why. What a change leads to is worked out over the cycles that follow, a piece in
-/// each: it takes effect within 10 cycles, and until then the variation goes on as before. Cutting torque counts at once.
+/// each: it takes effect within 20 cycles, and until then the variation goes on as before. Cutting torque counts at once.
 ///
 /// A fault is named in `message` in its cycle; the speed then goes back to its mean as after GIB_SPEED_VARIATION_STOP, with status
 /// GIB_BUSY, and only then the error is returned. After a drive fault gib lets go at once.
@@ -143,52 +143,39 @@ pub unsafe extern "C" fn gib_speed_variation_step(
     input: *const SpeedVariationInput,
     output: *mut SpeedVariationOutput,
 ) -> i32 {
-    // SAFETY: the caller promises each is NULL or valid.
-    let (handle, input, output) = unsafe { (handle.as_mut(), input.as_ref(), output.as_mut()) };
-    // Two ways out by turns: checks that lead to one place would be computed and joined, which costs more.
-    let Some(handle) = handle else { return step_refused(None, input, output) };
-    let Some(input) = input else { return step_in_full(Some(handle), None, output) };
-    let Some(output) = output else { return step_refused(Some(handle), Some(input), None) };
+    if handle.is_null() || input.is_null() || output.is_null() {
+        // SAFETY: the caller promises each is NULL or valid.
+        return unsafe { misused(handle.as_ref(), input.as_ref(), output.as_mut()) };
+    }
+    // SAFETY: as above, and none is NULL.
+    let (handle, input, output) = unsafe { (&mut *handle, &*input, &mut *output) };
     if handle.alive == ALIVE && handle.machine.quick(input) {
         *output = *handle.machine.output();
         return output.status;
     }
-    step_in_full(Some(handle), Some(input), Some(output))
-}
-
-/// A cycle without an instance or an output; `extern "C"` as below.
-#[cold]
-#[inline(never)]
-extern "C" fn step_refused(
-    handle: Option<&mut GibSpeedVariation>,
-    input: Option<&SpeedVariationInput>,
-    output: Option<&mut SpeedVariationOutput>,
-) -> i32 {
-    misused(handle, input, output)
+    step_in_full(handle, input, output)
 }
 
 /// A cycle that is not a cheap one. `extern "C"`: it cannot unwind, so that it is called by a jump and the cheap cycle saves
 /// no registers.
 #[inline(never)]
 extern "C" fn step_in_full(
-    handle: Option<&mut GibSpeedVariation>,
-    input: Option<&SpeedVariationInput>,
-    output: Option<&mut SpeedVariationOutput>,
+    handle: &mut GibSpeedVariation,
+    input: &SpeedVariationInput,
+    output: &mut SpeedVariationOutput,
 ) -> i32 {
-    match (handle, input, output) {
-        (Some(handle), Some(input), Some(output)) if handle.alive == ALIVE => {
-            handle.machine.turn(input);
-            *output = *handle.machine.output();
-            output.status
-        }
-        (handle, input, output) => misused(handle, input, output),
+    if handle.alive != ALIVE {
+        return misused(Some(handle), Some(input), Some(output));
     }
+    handle.machine.turn(input);
+    *output = *handle.machine.output();
+    output.status
 }
 
 /// A step without an instance, an input or an output: the speed asked for is the last one.
 #[cold]
 fn misused(
-    handle: Option<&mut GibSpeedVariation>,
+    handle: Option<&GibSpeedVariation>,
     input: Option<&SpeedVariationInput>,
     output: Option<&mut SpeedVariationOutput>,
 ) -> i32 {

@@ -14,7 +14,7 @@ pub const GIB_SPEED_VARIATION_FAILED: i32 = 4;
 /// Input flag: end the variation; the speed goes back to its mean, then `GIB_DONE`.
 pub const GIB_SPEED_VARIATION_STOP: u32 = 8;
 
-/// What the kernel asks for in a cycle. Values may change in any cycle; a change takes effect within 10 cycles.
+/// What the kernel asks for in a cycle. Values may change in any cycle; a change takes effect within 20 cycles.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SpeedVariationInput {

@@ -54,6 +54,11 @@ pub struct Motor {
 /// Golden sections of the phase: to 10⁻⁴ of a quarter turn; a maximum is flat, so its value is good to 10⁻⁸.
 const SECTIONS: u32 = 20;
 
+/// Rounds, of two steps each, that find the moments of a sine.
+pub const POWER_ROUNDS: u8 = 3;
+/// See `POWER_ROUNDS`.
+pub const SLOPE_ROUNDS: u8 = 2;
+
 impl Motor {
     /// Torque left to accelerate with at a speed above 0, N·m; negative where there is none.
     #[inline(always)]
@@ -79,6 +84,16 @@ impl Motor {
     /// Largest amplitude at a mean speed (rad/s, above 0) and a period (s, above 0), and what limits it.
     #[must_use]
     pub fn amplitude(&self, wave: Wave, mean: f64, period: f64) -> (f64, Limit) {
+        let moment = match wave {
+            Wave::Triangle => 0.0,
+            Wave::Sine => found(POWER_ROUNDS, |x| self.power_moment(mean, period, x)),
+        };
+        self.amplitude_at(wave, mean, period, moment)
+    }
+
+    /// The same where the moment of a sine's largest power is known.
+    #[must_use]
+    pub fn amplitude_at(&self, wave: Wave, mean: f64, period: f64, moment: f64) -> (f64, Limit) {
         if self.left(mean) <= 0.0 || mean <= self.speeds[0] || mean >= self.speeds[1] {
             let out = mean <= self.speeds[0] || mean >= self.speeds[1];
             return (0.0, if out { Limit::Speed } else { Limit::Nothing });
@@ -86,7 +101,7 @@ impl Motor {
         let by_speed = self.by_speed(mean);
         let (by_power, by_torque) = match wave {
             Wave::Triangle => self.triangle(mean, period),
-            Wave::Sine => self.sine(mean, period),
+            Wave::Sine => self.sine(mean, period, moment),
         };
         let power = (by_power, Limit::Power);
         let torque = (by_torque, Limit::Torque);
@@ -110,10 +125,24 @@ impl Motor {
         (by_power, (self.torque - self.used - self.viscous * mean) / steep)
     }
 
-    fn sine(&self, mean: f64, period: f64) -> (f64, f64) {
+    /// Where a sine that takes all power does so, as a share of the mean speed above it: a round nearer than `from`.
+    #[must_use]
+    pub fn power_moment(&self, mean: f64, period: f64, from: Option<f64>) -> f64 {
+        let (balance, a) = (Balance::of(self, mean), TAU * self.inertia * mean / period);
+        balance.nearer(a, balance.nearer(a, from.unwrap_or_else(|| balance.guess(a))))
+    }
+
+    /// Where a sine of this amplitude is steepest for what power leaves, as a share of the mean speed above it: a round nearer
+    /// than `from`.
+    #[must_use]
+    pub fn slope_moment(&self, mean: f64, amplitude: f64, from: Option<f64>) -> f64 {
+        Balance::of(self, mean).nearer_slope(amplitude, from)
+    }
+
+    fn sine(&self, mean: f64, period: f64, moment: f64) -> (f64, f64) {
         let (balance, a) = (Balance::of(self, mean), TAU * self.inertia * mean / period);
         let steep = (a * a + balance.viscous * balance.viscous).sqrt();
-        (balance.amplitude(a), (self.torque - balance.used - balance.viscous) / steep)
+        (balance.amplitude(a, moment), (self.torque - balance.used - balance.viscous) / steep)
     }
 
     /// Shortest period (s) for an amplitude at a mean speed (rad/s); what stands in the way where none is long enough.
@@ -121,6 +150,18 @@ impl Motor {
     /// # Errors
     /// The limit that no period overcomes.
     pub fn period(&self, wave: Wave, mean: f64, amplitude: f64) -> Result<f64, Limit> {
+        let moment = match wave {
+            Wave::Triangle => 0.0,
+            Wave::Sine => found(SLOPE_ROUNDS, |x| self.slope_moment(mean, amplitude, x)),
+        };
+        self.period_at(wave, mean, amplitude, moment)
+    }
+
+    /// The same where the moment at which a sine is steepest is known.
+    ///
+    /// # Errors
+    /// As [`Motor::period`].
+    pub fn period_at(&self, wave: Wave, mean: f64, amplitude: f64, moment: f64) -> Result<f64, Limit> {
         let top = mean * (1.0 + amplitude);
         if top > self.speeds[1] || mean * (1.0 - amplitude) < self.speeds[0] {
             return Err(Limit::Speed);
@@ -136,7 +177,7 @@ impl Motor {
                 // cos φ / (T − used − viscous·(1 + q·sin φ)) is largest where its derivative by φ is 0.
                 let (level, swing_of_it) = (self.torque - balance.used - balance.viscous, amplitude * balance.viscous);
                 let by_torque = 1.0 / (level * level - swing_of_it * swing_of_it).sqrt();
-                TAU * swing * by_torque.max(balance.slope(amplitude))
+                TAU * swing * by_torque.max(balance.slope(amplitude, moment))
             }
         })
     }
@@ -223,42 +264,62 @@ impl Balance {
     /// ```
     ///
     /// which rises and bends upward with x: Newton's way from the right never passes the root.
-    fn amplitude(&self, a: f64) -> f64 {
-        const STEPS: u32 = 6;
-        let Balance { power, used, viscous } = *self;
-        let mut x = ((power - used - viscous) / (a * a / (viscous + power) + used + 2.0 * viscous)).min(1.0);
-        for _ in 0..STEPS {
-            let w = 1.0 + x;
-            let below = viscous * w * w + power;
-            let h = a * a * w / below;
-            let value = h * w * w * x + used * w + viscous * w * w - power;
-            let slope = h * (w * (4.0 * w - 3.0) - 2.0 * viscous * w * w * w * x / below) + used + 2.0 * viscous * w;
-            x = (x - value / slope).min(1.0);
-        }
+    fn amplitude(&self, a: f64, x: f64) -> f64 {
         let w = 1.0 + x;
-        let tangent = viscous + power / (w * w);
+        let tangent = self.viscous + self.power / (w * w);
         x * (tangent * tangent + a * a).sqrt() / tangent
+    }
+
+    /// On the right of that root.
+    fn guess(&self, a: f64) -> f64 {
+        let Balance { power, used, viscous } = *self;
+        ((power - used - viscous) / (a * a / (viscous + power) + used + 2.0 * viscous)).min(1.0)
+    }
+
+    /// A step of Newton's toward it.
+    fn nearer(&self, a: f64, x: f64) -> f64 {
+        let Balance { power, used, viscous } = *self;
+        let w = 1.0 + x;
+        let below = viscous * w * w + power;
+        let h = a * a * w / below;
+        let value = h * w * w * x + used * w + viscous * w * w - power;
+        let slope = h * (w * (4.0 * w - 3.0) - 2.0 * viscous * w * w * w * x / below) + used + 2.0 * viscous * w;
+        (x - value / slope).min(1.0)
     }
 
     /// Largest cos φ / (what power leaves at φ) of a sine of this amplitude, 1/(N·m); power leaves some at its top.
     ///
     /// Its moment is the one root within (0, q) of a cubic that bends upward, then downward: from the bend Newton's way never
     /// passes it.
-    fn slope(&self, amplitude: f64) -> f64 {
-        const STEPS: u32 = 4;
+    fn slope(&self, amplitude: f64, x: f64) -> f64 {
         let Balance { power, used, viscous } = *self;
-        let (level, square) = (used + viscous, amplitude * amplitude);
-        let (c2, c1) = (2.0 * (power - level) - square * viscous, power - level - 2.0 * square * viscous);
-        let c0 = -square * (power + viscous);
-        let bend = if level > 0.0 { c2 / (3.0 * level) } else { amplitude };
-        let mut x = bend.max(0.0).min(amplitude);
-        for _ in 0..STEPS {
-            x -= (((c2 - level * x) * x + c1) * x + c0) / ((2.0 * c2 - 3.0 * level * x) * x + c1);
-        }
         let sin = (x / amplitude).clamp(0.0, 1.0);
         let w = 1.0 + amplitude * sin;
         (1.0 - sin * sin).sqrt() / (power / w - used - viscous * w)
     }
+
+    /// Two steps of Newton's toward that moment, from the bend where none was made yet.
+    fn nearer_slope(&self, amplitude: f64, from: Option<f64>) -> f64 {
+        let Balance { power, used, viscous } = *self;
+        let (level, square) = (used + viscous, amplitude * amplitude);
+        let (c2, c1) = (2.0 * (power - level) - square * viscous, power - level - 2.0 * square * viscous);
+        let c0 = -square * (power + viscous);
+        let bend = || if level > 0.0 { c2 / (3.0 * level) } else { amplitude }.max(0.0).min(amplitude);
+        let mut x = from.unwrap_or_else(bend);
+        for _ in 0..2 {
+            x -= (((c2 - level * x) * x + c1) * x + c0) / ((2.0 * c2 - 3.0 * level * x) * x + c1);
+        }
+        x
+    }
+}
+
+/// What so many rounds lead to.
+fn found(rounds: u8, round: impl Fn(Option<f64>) -> f64) -> f64 {
+    let mut x = None;
+    for _ in 0..rounds {
+        x = Some(round(x));
+    }
+    x.unwrap_or(0.0)
 }
 
 /// The highest value over the rising quarter of a swing of a function of (cos φ, sin φ) with one maximum there.

@@ -7,6 +7,7 @@
 //! cost little ([`quick`]).
 
 mod quick;
+mod way_back;
 
 use super::config::SpeedVariationLimits;
 use super::io::*;
@@ -38,7 +39,7 @@ enum Phase {
 }
 
 /// Cycles in which a change is worked out, at most: it may come when the work for another has just begun.
-pub const WORKED_OUT: u32 = 10;
+pub const WORKED_OUT: u32 = 20;
 
 /// Two values of an input, side by side: aligned, so that a processor compares both at once.
 #[derive(Debug, Clone, Copy, Default)]
@@ -54,12 +55,14 @@ pub struct SpeedVariation {
     fault: Fault,
     /// Values of the input last seen, and what they ask for.
     seen: [Pair; 2],
+    /// Its flags, on the way back; a stop may be asked for until it ends.
+    flags: u32,
     asked: Asked,
     /// What the cycles go by, and what is being worked out to follow it.
     now: Setting,
     next: Setting,
     piece: Piece,
-    /// Change of speed on the way back, and the cycles left to get there.
+    /// Change of speed on the way back, and the cycles left to get there beside those granted.
     back: f64,
     patience: u32,
     speed: f64,
@@ -69,9 +72,13 @@ pub struct SpeedVariation {
     phasor: [f64; 2],
     turn: f64,
     swing: f64,
-    /// Cycles left that need only the quick look, and the change in one of them: of a triangle's speed, a sine's swing.
+    /// Cycles left that need only the quick look, or would but for what is being worked out, and the change in one of them: of
+    /// the speed on a slope, of a sine's swing.
     quiet: i32,
+    meanwhile: i32,
     steady: f64,
+    /// The speed goes along a slope: of a triangle, or back.
+    slope: bool,
     /// Motor that bounds the change in a cycle.
     motor: Motor,
     /// Friction that helps to brake, without cutting, which may end at any moment.
@@ -93,6 +100,7 @@ impl Default for SpeedVariation {
             phase: Phase::Idle,
             fault: Fault::NONE,
             seen: [Pair([f64::NAN; 2]); 2],
+            flags: 0,
             asked: Setting::still(0.0).asked,
             now: Setting::still(0.0),
             next: Setting::still(0.0),
@@ -105,7 +113,9 @@ impl Default for SpeedVariation {
             turn: 0.0,
             swing: 0.0,
             quiet: 0,
+            meanwhile: 0,
             steady: 0.0,
+            slope: true,
             motor: Plan::REST.motor,
             brake_help: 0.0,
             per_nm: 0.0,
@@ -132,6 +142,7 @@ impl SpeedVariation {
             speed: plan.mean,
             asked: Setting::still(plan.mean).asked,
             now: Setting::still(plan.mean),
+            slope: plan.wave == Wave::Triangle,
             motor: plan.driving(plan.motor),
             per_nm: plan.cycle_s / plan.motor.inertia,
             to_torque: plan.sense * plan.motor.inertia / plan.cycle_s,
@@ -191,7 +202,8 @@ impl SpeedVariation {
         &self.output
     }
 
-    #[inline]
+    /// One cycle of the variation.
+    #[inline(always)]
     fn advance(&mut self) {
         let (before, wanted) = match self.plan.wave {
             Wave::Triangle => (self.speed, self.triangle()),
@@ -215,6 +227,15 @@ impl SpeedVariation {
         self.speed += change;
         self.output.speed_command_rpm = self.speed * self.to_rpm;
         self.output.torque_nm = change * self.to_torque;
+    }
+
+    /// Whether the motor has enough for a change in a cycle at a speed, and at lower ones, without friction's help. What is no
+    /// number is not enough.
+    #[inline(always)]
+    fn has(&self, change: f64, speed: f64) -> bool {
+        let [power, torque, used, viscous] = self.in_changes;
+        let needs = change.abs() + used + viscous * speed;
+        needs <= torque && needs * speed <= power
     }
 
     /// Change toward the next corner, turned back at it as light is by a mirror, so that the period is kept exactly.
@@ -260,47 +281,71 @@ impl SpeedVariation {
     #[inline(never)]
     pub fn turn(&mut self, input: &SpeedVariationInput) {
         self.quiet += 1;
+        if self.phase != Phase::Running || !self.same(input) {
+            self.turn_unlike(input);
+        } else if self.piece == Piece::Nothing {
+            self.advance();
+        } else {
+            self.work();
+            self.go_on();
+        }
+    }
+
+    /// One cycle of what the cycles go by, with or without a look.
+    #[inline(always)]
+    fn go_on(&mut self) {
+        if self.meanwhile > 0 && self.steadily() {
+            self.meanwhile -= 1;
+        } else {
+            self.advance_beside();
+        }
+    }
+
+    /// A cycle whose input asks for something else, or in which nothing varies.
+    #[inline(never)]
+    fn turn_unlike(&mut self, input: &SpeedVariationInput) {
         match self.phase {
-            Phase::Running if self.piece == Piece::Nothing && self.same(input) => self.advance(),
             Phase::Idle | Phase::Done | Phase::Failed => {
                 if input.speed_rpm.is_finite() {
                     self.output.speed_command_rpm = input.speed_rpm;
                 }
             }
-            Phase::Stopping => {
-                if let Some(fault) = danger(input) {
-                    self.leave(fault);
-                }
-                if self.phase == Phase::Stopping {
-                    self.go_back(input);
-                }
-            }
+            Phase::Stopping => match danger(input) {
+                Some(fault) => self.leave(fault),
+                None => (self.seen, self.flags) = (pairs(input), input.flags),
+            },
             Phase::Begin | Phase::Running => {
                 self.work();
-                if !self.same(input) {
-                    self.take(input);
-                }
-                match self.phase {
-                    Phase::Running => self.advance(),
-                    Phase::Stopping => self.go_back(input),
-                    _ => {}
-                }
+                self.take(input);
             }
         }
+        match self.phase {
+            Phase::Running => self.go_on(),
+            Phase::Stopping => self.go_back(input),
+            _ => {}
+        }
+    }
+
+    /// [`advance`](Self::advance) where there is more to do, so that the cycle with nothing else saves no registers.
+    #[inline(never)]
+    fn advance_beside(&mut self) {
+        self.advance();
     }
 
     /// Takes over what this cycle's input asks for, to be worked out; or ends the variation.
     fn take(&mut self, input: &SpeedVariationInput) {
         self.seen = pairs(input);
+        let begins = self.phase == Phase::Begin;
         let asked = match danger(input) {
             Some(fault) => Err(fault),
             None => self.plan.wanted(input.speed_rpm, input.amplitude_ratio, input.period_s, input.cutting_nm),
         };
+        let before = self.asked[3];
         match asked {
             Ok(asked) => self.asked = asked,
             Err(fault) => return self.leave(fault),
         }
-        if self.phase == Phase::Begin {
+        if begins {
             self.speed = self.asked[0];
             self.now = Setting::still(self.speed);
             self.output.speed_command_rpm = self.speed * self.to_rpm;
@@ -309,11 +354,20 @@ impl SpeedVariation {
         if self.piece == Piece::Nothing {
             self.begin_work();
         }
-        self.load(self.asked[3]);
-        self.quiet = 0;
+        if begins || self.asked[3] != before {
+            self.load(self.asked[3]);
+            self.look_anew();
+        }
+        // With the load of before the cycles go on as they were granted.
+        (self.quiet, self.meanwhile) = (0, self.meanwhile.max(self.quiet));
         if input.flags & GIB_SPEED_VARIATION_STOP != 0 {
             self.set_out();
         }
+    }
+
+    /// Takes back what was granted.
+    fn look_anew(&mut self) {
+        (self.quiet, self.meanwhile) = (0, 0);
     }
 
     /// Counts with this cutting torque (N·m) from now on.
@@ -328,11 +382,12 @@ impl SpeedVariation {
     /// Begins to work out what is asked for, unless the cycles go by it already.
     fn begin_work(&mut self) {
         if self.asked != self.now.asked {
-            (self.next.asked, self.piece) = (self.asked, Piece::Amplitude);
+            self.piece = self.next.begin(&self.plan, self.asked);
         }
     }
 
     /// One piece of that. What is asked for meanwhile comes next.
+    #[inline(never)]
     fn work(&mut self) {
         if self.piece != Piece::Nothing {
             if self.piece == Piece::Whole {
@@ -364,58 +419,12 @@ impl SpeedVariation {
         // What has stood begins upward.
         self.rising |= self.now.rate == 0.0;
         self.now = next;
-    }
-
-    /// One cycle back toward the mean, with what cutting leaves now, whatever else is wrong with the input.
-    fn go_back(&mut self, input: &SpeedVariationInput) {
-        let cutting = input.cutting_nm;
-        if cutting != self.asked[3] && (0.0..=MOST_CUTTING).contains(&cutting) {
-            self.asked[3] = cutting;
-            self.load(cutting);
-        }
-        let missing = self.mean() - self.speed;
-        self.go(missing.max(-self.back).min(self.back));
-        self.patience = self.patience.saturating_sub(1);
-        let there = (self.mean() - self.speed).abs() <= 1e-9 * self.mean();
-        if !there && self.patience == 0 && self.fault == Fault::NONE {
-            self.fault = Fault::of(GIB_ERR_SPEED_VARIATION_NONE);
-            self.output.message = GIB_ERR_SPEED_VARIATION_NONE;
-        }
-        if there || self.patience == 0 {
-            self.output.torque_nm = 0.0;
-            self.enter(if self.fault == Fault::NONE { Phase::Done } else { Phase::Failed });
-        }
-    }
-
-    /// Sets out for the mean, at the variation's own rate but not slower than a tenth of it in a second.
-    fn set_out(&mut self) {
-        const SLOWEST_1_S: f64 = 0.1;
-        self.back = self.now.rate.max(SLOWEST_1_S * self.mean() * self.plan.cycle_s);
-        let cycles = 2.0 * (self.mean() - self.speed).abs() / self.back + 1.0 / self.plan.cycle_s;
-        self.patience = cycles as u32;
-        self.enter(Phase::Stopping);
-    }
-
-    /// The one door out: keeps the first fault and goes back to the mean speed; with a faulted drive it just ends.
-    #[cold]
-    fn leave(&mut self, fault: Fault) {
-        if self.fault == Fault::NONE {
-            self.fault = fault;
-            self.output.message = fault.code;
-        }
-        match self.phase {
-            Phase::Running if fault.code != GIB_ERR_DRIVE_FAULT => self.set_out(),
-            Phase::Stopping if fault.code != GIB_ERR_DRIVE_FAULT => {} // on the way already
-            _ => {
-                self.output.torque_nm = 0.0;
-                self.enter(Phase::Failed);
-            }
-        }
+        self.look_anew();
     }
 
     fn enter(&mut self, phase: Phase) {
         self.phase = phase;
-        self.quiet = 0;
+        self.look_anew();
         self.output.status = match phase {
             Phase::Idle => GIB_OK,
             Phase::Begin | Phase::Running | Phase::Stopping => GIB_BUSY,

@@ -117,7 +117,9 @@ impl Plan {
         let plan = Plan { cycle_s: in_range("cycle_s\0", c.cycle_s, 5e-5, 0.02)?, ..Plan::new(c)? };
         in_range("amplitude_ratio\0", plan.amplitude, LEAST, MOST)?;
         in_range("period_s\0", plan.period, PERIODS[0].max(8.0 * plan.cycle_s), PERIODS[1])?;
-        let (possible, limit) = plan.possible(&plan.motor_cutting(plan.cutting), plan.mean, plan.period);
+        let motor = plan.motor_cutting(plan.cutting);
+        let (possible, limit) =
+            plan.or_published(&motor, plan.mean, plan.period, || motor.amplitude(plan.wave, plan.mean, plan.period));
         if plan.amplitude > possible * (1.0 + 1e-9) {
             let (field, value) = ("amplitude_ratio\0", plan.amplitude);
             return Err(Fault { code: code(limit), field, value, low: 0.0, high: possible });
@@ -149,25 +151,35 @@ impl Plan {
         used + self.motor.used
     }
 
-    /// Largest amplitude by the formula chosen.
+    /// Whether the limits are those of a sine that has no closed solution.
     #[must_use]
-    pub fn possible(&self, motor: &Motor, mean: f64, period: f64) -> (f64, Limit) {
+    pub fn in_rounds(&self) -> bool {
+        self.wave == Wave::Sine && !self.published
+    }
+
+    /// Largest amplitude by the formula chosen; `moment` of a sine's largest power.
+    #[must_use]
+    pub fn possible(&self, motor: &Motor, mean: f64, period: f64, moment: f64) -> (f64, Limit) {
+        self.or_published(motor, mean, period, || motor.amplitude_at(self.wave, mean, period, moment))
+    }
+
+    fn or_published(&self, motor: &Motor, mean: f64, period: f64, exact: impl Fn() -> (f64, Limit)) -> (f64, Limit) {
         if self.published {
             // The print knows no bound of speed either, but that is the machine's.
             let (amplitude, by_speed) = (motor.published_amplitude(mean, period).min(MOST), motor.by_speed(mean));
             return if by_speed < amplitude { (by_speed, Limit::Speed) } else { (amplitude, Limit::Power) };
         }
-        let (amplitude, limit) = motor.amplitude(self.wave, mean, period);
+        let (amplitude, limit) = exact();
         if amplitude > MOST { (MOST, Limit::Speed) } else { (amplitude, limit) }
     }
 
-    /// Shortest period by the formula chosen; 0: none.
+    /// Shortest period by the formula chosen; 0: none. `moment` at which a sine is steepest.
     #[must_use]
-    pub fn shortest(&self, motor: &Motor, mean: f64, amplitude: f64) -> f64 {
+    pub fn shortest(&self, motor: &Motor, mean: f64, amplitude: f64, moment: f64) -> f64 {
         if self.published {
             return motor.published_period(mean, amplitude);
         }
-        motor.period(self.wave, mean, amplitude).unwrap_or(0.0)
+        motor.period_at(self.wave, mean, amplitude, moment).unwrap_or(0.0)
     }
 
     /// What is possible and what is recommended for this speed, amplitude and period.

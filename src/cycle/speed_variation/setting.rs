@@ -2,9 +2,9 @@
 //!
 //! It is worked out a piece a cycle, so that a change costs no cycle much; meanwhile the setting before goes on.
 
-use super::limit::{Limit, Motor};
+use super::limit::{Limit, Motor, POWER_ROUNDS, SLOPE_ROUNDS};
 use super::plan::Plan;
-use core::f64::consts::PI;
+use crate::cycle::turns::cos_sin;
 
 /// What the kernel asks for: mean speed (rad/s), amplitude (share of it), period (s), cutting torque (N·m).
 pub type Asked = [f64; 4];
@@ -12,8 +12,12 @@ pub type Asked = [f64; 4];
 /// The piece that is due.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Piece {
-    /// Largest amplitude; ends in its cycle, as the others do.
+    /// A round toward the moment of a sine's largest power; ends in its cycle, as the others do. How many are left after it.
+    Power(u8),
+    /// Largest amplitude.
     Amplitude,
+    /// A round toward the moment at which a sine is steepest for the motor. How many are left after it.
+    Slope(u8),
     /// Shortest period.
     Period,
     /// Corner speeds and rates.
@@ -31,6 +35,8 @@ pub enum Piece {
 pub struct Setting {
     /// What it is for.
     pub asked: Asked,
+    /// The moment of a sine that is being found.
+    moment: Option<f64>,
     /// Amplitude in effect, and the largest and what limits it.
     pub granted: f64,
     /// See `granted`.
@@ -60,6 +66,7 @@ impl Setting {
     pub fn still(mean: f64) -> Setting {
         Setting {
             asked: [mean, 0.0, 0.0, 0.0],
+            moment: None,
             granted: 0.0,
             possible: 0.0,
             limit: Limit::Nothing,
@@ -73,18 +80,33 @@ impl Setting {
         }
     }
 
+    /// Begins anew; returns the first piece.
+    pub fn begin(&mut self, plan: &Plan, asked: Asked) -> Piece {
+        (self.asked, self.moment) = (asked, None);
+        if plan.in_rounds() { Piece::Power(POWER_ROUNDS - 1) } else { Piece::Amplitude }
+    }
+
     /// Works out one piece; returns the next.
     pub fn work(&mut self, plan: &Plan, piece: Piece) -> Piece {
         let [mean, amplitude, period, cutting] = self.asked;
         let motor = plan.motor_cutting(cutting);
         match piece {
+            Piece::Power(left) => {
+                self.moment = Some(motor.power_moment(mean, period, self.moment));
+                if left > 0 { Piece::Power(left - 1) } else { Piece::Amplitude }
+            }
             Piece::Amplitude => {
-                (self.possible, self.limit) = plan.possible(&motor, mean, period);
+                (self.possible, self.limit) = plan.possible(&motor, mean, period, self.moment.unwrap_or(0.0));
                 self.granted = amplitude.min(self.possible);
-                Piece::Period
+                self.moment = None;
+                if plan.in_rounds() { Piece::Slope(SLOPE_ROUNDS - 1) } else { Piece::Period }
+            }
+            Piece::Slope(left) => {
+                self.moment = Some(motor.slope_moment(mean, amplitude, self.moment));
+                if left > 0 { Piece::Slope(left - 1) } else { Piece::Period }
             }
             Piece::Period => {
-                self.shortest = plan.shortest(&motor, mean, amplitude);
+                self.shortest = plan.shortest(&motor, mean, amplitude, self.moment.unwrap_or(0.0));
                 Piece::Corners
             }
             Piece::Corners => {
@@ -98,7 +120,7 @@ impl Setting {
             Piece::Rest => {
                 let (driving, torque) = (plan.driving(motor), self.rate * plan.motor.inertia / plan.cycle_s);
                 self.free = [0.0, plan.brake_help(motor.used)].map(|help| driving.fastest(torque - help));
-                let sin = (PI * plan.cycle_s / period).sin();
+                let (_, sin) = cos_sin(0.5 * plan.cycle_s / period);
                 self.half = [(1.0 - sin * sin).sqrt(), sin];
                 Piece::Whole
             }

@@ -9,6 +9,10 @@ pub struct Ahead {
     pub cycles: u32,
     /// See `cycles`.
     pub cruise: u32,
+    /// Cycles before those, of which each changes the command's speed by `rate`; one more brings it to its speed.
+    pub speeding: u32,
+    /// See `speeding`.
+    pub rate: f64,
     /// Lowest filtered torque of usual cycles.
     pub low: f64,
     /// Highest.
@@ -33,17 +37,24 @@ pub struct Caught {
     pub speed: f64,
 }
 
+/// Cycles at the end of a move that are left to the other steps: there the command might go past its goal, or arrives.
+const LAST: f64 = 2.0;
+
 impl Side {
-    /// Looks ahead, after a cycle's step of the command. The last cycles of a move are left to the other steps.
+    /// Looks ahead, after a cycle's step of the command.
     #[must_use]
     pub fn look_ahead(&self, plan: &Plan) -> Ahead {
         let p = &self.profile;
         let (way, speed) = (p.left().abs(), p.speed_max());
-        // Of the way that is left at the largest speed; the last part takes as long as braking does.
-        let to_goal =
-            higher(way / speed - 2.0 * plan.acceleration / speed, (2.0 * way / plan.acceleration).sqrt()) - 4.0;
+        // Of the way that is left at the largest speed and then braking, or braking all the way.
+        let to_brake = speed / plan.acceleration;
+        let to_goal = if 2.0 * way > speed * to_brake {
+            way / speed + 0.5 * to_brake
+        } else {
+            (2.0 * way / plan.acceleration).sqrt()
+        };
         let (low, high) = (-self.trip, self.trip);
-        let ahead = Ahead { cycles: to_goal as u32, cruise: 0, low, high };
+        let ahead = Ahead { cycles: (to_goal - LAST) as u32, cruise: 0, speeding: 0, rate: 0.0, low, high };
         if self.held {
             let next = match self.standing {
                 standing if standing < plan.hold => plan.hold,
@@ -55,17 +66,30 @@ impl Side {
             let cycles = if self.reads_on(plan) { cycles } else { 0 };
             return Ahead { cycles, low: plan.release, high: plan.bound, ..ahead };
         }
-        if !p.cruises() {
-            // While it speeds up, until it has; the rest is then at constant speed.
-            let to_speed = (speed - p.speed.copysign(p.speed * p.left())) / plan.acceleration;
-            let speeds_up = way > p.braking();
-            return Ahead { cycles: if speeds_up { ahead.cycles.min(to_speed as u32) } else { ahead.cycles }, ..ahead };
-        }
-        let to_end = plan.distance[1] - plan.sense * (p.position - self.start);
-        let away = p.speed * plan.sense < 0.0;
         // The axis may lead its command by the largest lag.
-        let free = lower(way - p.braking() - 2.0 * speed, if away { way } else { to_end - plan.lag_limit });
-        Ahead { cruise: (free / speed) as u32, ..ahead }
+        let to_end = plan.distance[1] - plan.sense * (p.position - self.start) - plan.lag_limit;
+        let away = p.left() * plan.sense < 0.0;
+        let free = lower(way, if away { way } else { to_end });
+        let cruise = |before: f64| (lower(way - before - p.braking() - 2.0 * speed, free - before) / speed) as u32;
+        if p.cruises() {
+            return Ahead { cruise: cruise(0.0), ..ahead };
+        }
+        // On the way that speeding up takes, no longer than braking, it need not brake.
+        let to_speed = (speed - p.speed.copysign(p.speed * p.left())) / plan.acceleration;
+        if free > 2.0 * p.braking() && p.speed.abs() <= speed && to_speed >= 1.0 {
+            let rate = plan.acceleration.copysign(p.left());
+            let cycles = (to_goal - LAST + 0.5 * to_speed * to_speed / to_brake) as u32;
+            return Ahead { cycles, cruise: cruise(p.braking()), speeding: to_speed as u32, rate, ..ahead };
+        }
+        // While it speeds up, until it has; the rest may then be at constant speed.
+        let speeds_up = way > p.braking();
+        Ahead { cycles: if speeds_up { ahead.cycles.min(to_speed as u32) } else { ahead.cycles }, ..ahead }
+    }
+
+    /// Whether the command goes on, but nears its goal so that none of the cycles left is usual.
+    #[must_use]
+    pub fn arrives(&self, plan: &Plan) -> bool {
+        self.goes_on(plan) && self.profile.left().abs() < 0.5 * (LAST + 1.0) * (LAST + 1.0) * plan.acceleration
     }
 
     /// Takes over what usual cycles have made of it.
