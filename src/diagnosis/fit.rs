@@ -13,6 +13,7 @@ pub use slopes::Slope;
 
 use super::causes::{Law, Rest, Term, Trace};
 use super::frame::Frame;
+use super::known::Known;
 use super::many::{add, dot};
 use super::progress::{Stopped, Watch};
 use crate::machine::Effect;
@@ -34,8 +35,10 @@ pub struct Bench<'f, 'a> {
     pub measured: Vec<f64>,
     /// Noise floors of torque and table − encoder at the judged rows, first guess.
     pub floors: [f64; 2],
-    /// What the belief's effects add to its base values, stacked and scaled.
-    pub known: Vec<f64>,
+    /// What the belief's effects may be off by, stacked and scaled.
+    pub doubt: Vec<f64>,
+    /// Weight of each row beside its noise: less where what is believed there may be off, stacked.
+    certain: Vec<f64>,
     /// Judged rows of the torque; those of the table follow.
     pub rows: usize,
     /// Orthonormal columns that are free in every fit: the zero of the table's scale.
@@ -72,29 +75,34 @@ pub struct Fit {
 }
 
 impl<'f, 'a> Bench<'f, 'a> {
-    /// Sets up the equations; `base` is what everything believed makes at the judged rows.
+    /// Sets up the equations beside what is believed.
     #[must_use]
-    pub fn new(frame: &'f Frame<'a>, base: &Trace) -> Self {
-        let torque: Vec<f64> = frame.torque(0.0).iter().zip(&base.torque).map(|(t, b)| t - b).collect();
-        let mut table = frame.table_error();
-        table.iter_mut().zip(&base.table).for_each(|(t, b)| *t -= b);
-        let rows = torque.len();
-        let effects: Vec<f64> = base.torque.iter().zip(frame.believed()).map(|(all, base)| all - base).collect();
-        let floors = [frame.floor(&torque, true), if table.is_empty() { 1.0 } else { frame.floor(&table, false) }];
-        let measured: Vec<f64> = torque
-            .iter()
-            .zip(&frame.weights)
-            .map(|(t, w)| w * t / floors[0])
-            .chain(table.iter().map(|t| t / floors[1]))
-            .collect();
-        let mut free = Vec::new();
-        if !table.is_empty() {
-            let mut level = vec![0.0; measured.len()];
-            level[rows..].fill(1.0 / (table.len() as f64).sqrt());
-            free.push(level);
+    pub fn new(frame: &'f Frame<'a>, known: &Known) -> Self {
+        let less = |measured: Vec<f64>, expected: &[f64]| -> Vec<f64> {
+            measured.iter().zip(expected).map(|(measured, expected)| measured - expected).collect()
+        };
+        let left = Trace {
+            torque: less(frame.torque(0.0), &known.trace.torque),
+            table: less(frame.table_error(), &known.trace.table),
+        };
+        let floor_of_table = if left.table.is_empty() { 1.0 } else { frame.floor(&left.table, false) };
+        let floors = [frame.floor(&left.torque, true), floor_of_table];
+        let rows = left.torque.len();
+        let (doubt, measured, windows) = (Vec::new(), Vec::new(), Vec::new());
+        let certain = vec![1.0; rows + left.table.len()];
+        let mut bench = Self { frame, measured, floors, doubt, certain, rows, free: Vec::new(), windows };
+        let doubt = bench.stack(&known.doubt);
+        // A row errs by its noise and by what is believed there (generalised least squares).
+        bench.certain = doubt.iter().map(|doubt| doubt.hypot(1.0).recip()).collect();
+        bench.doubt = doubt.iter().zip(&bench.certain).map(|(doubt, certain)| doubt * certain).collect();
+        bench.measured = bench.stack(&left);
+        if !left.table.is_empty() {
+            let mut level = bench.certain.clone();
+            level[..rows].fill(0.0);
+            let length = dot(&level, &level).sqrt();
+            level.iter_mut().for_each(|level| *level /= length);
+            bench.free.push(level);
         }
-        let mut bench = Self { frame, measured, floors, known: Vec::new(), rows, free, windows: Vec::new() };
-        bench.known = bench.stack(&Trace { torque: effects, table: base.table.clone() });
         bench
     }
 
@@ -106,6 +114,7 @@ impl<'f, 'a> Bench<'f, 'a> {
         let weighted = trace.torque.iter().zip(&self.frame.weights);
         column.iter_mut().zip(weighted).for_each(|(c, (t, w))| *c = w * t / self.floors[0]);
         column.iter_mut().skip(rows).zip(&trace.table).for_each(|(c, t)| *c = t / self.floors[1]);
+        column.iter_mut().zip(&self.certain).for_each(|(c, certain)| *c *= certain);
         smoothed::summed(column, rows, &self.windows)
     }
 
@@ -123,8 +132,17 @@ impl<'f, 'a> Bench<'f, 'a> {
     /// What is left, channel by channel, in their own units; rows of the torque by their weight.
     #[must_use]
     pub fn rest(&self, fit: &Fit) -> [Vec<f64>; 2] {
-        let (torque, table) = fit.residual.split_at(self.rows);
+        let left: Vec<f64> = fit.residual.iter().zip(&self.certain).map(|(left, certain)| left / certain).collect();
+        let (torque, table) = left.split_at(self.rows);
         [torque.iter().map(|r| r * self.floors[0]).collect(), table.iter().map(|r| r * self.floors[1]).collect()]
+    }
+
+    /// Root mean square of what is left of each channel, in their own units, as far as what is believed holds exactly.
+    #[must_use]
+    pub fn certain_rms(&self, fit: &Fit) -> [f64; 2] {
+        let (torque, table) = fit.residual.split_at(self.rows);
+        [(torque, self.floors[0]), (table, self.floors[1])]
+            .map(|(left, floor)| floor * (dot(left, left) / left.len().max(1) as f64).sqrt())
     }
 
     /// Starts of a law on what is left.

@@ -7,6 +7,8 @@
 //! Timing: how late the torque column is by the servo's sampling alone is known from the machine file ([`Sampling`]) and
 //! taken off before any dead time is looked for.
 
+mod swings;
+
 use super::filter::{LowPass, convolve, norm, of_three};
 use super::grids;
 use super::many::{decay, product, to_the_power, widest};

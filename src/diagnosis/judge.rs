@@ -19,7 +19,7 @@ use crate::machine::{Axis, Cause, Effect};
 use crate::plant::physics::LEAST_SLOPE;
 
 /// Excess over the noise floor (in variance) below which a belief holds.
-const TOLERABLE_EXCESS: f64 = 0.6;
+pub const TOLERABLE_EXCESS: f64 = 0.6;
 /// The same of what is tied to no coordinate: noise of a current that was filtered over some rows is up to twice what second
 /// differences see of it, and what no move calls up is no machine's doing before that.
 const TOLERABLE_IF_UNTIED: f64 = 3.0;
@@ -245,13 +245,13 @@ pub struct Excess {
 }
 
 impl Excess {
-    /// The excess of a fit; the floor is that of the best fit.
+    /// The excess of a fit; the floor is that of the best fit. Where what is believed may be off, that much is no excess.
     #[must_use]
     pub fn of(bench: &Bench, fit: &Fit, best: &Fit) -> Excess {
-        let (rest, floor) = (bench.rest(fit), bench.rest(best));
+        let (rms, floor) = (bench.certain_rms(fit), bench.rest(best));
         let channels = (0..2)
-            .filter(|&c| !rest[c].is_empty())
-            .map(|c| (rms(&rest[c]) / bench.frame.floor(&floor[c], c == 0)).powi(2) - 1.0)
+            .filter(|&c| !floor[c].is_empty())
+            .map(|c| (rms[c] / bench.frame.floor(&floor[c], c == 0)).powi(2) - 1.0)
             .collect();
         Excess { channels }
     }

@@ -30,6 +30,7 @@ mod known;
 mod many;
 mod narrow;
 pub mod progress;
+mod reopened;
 mod rows;
 pub mod sampling;
 pub mod select;

@@ -47,8 +47,8 @@ const LEAST_T: f64 = 0.9;
 /// Share of what a cause explains that one block may hold.
 const MOST_IN_A_BLOCK: f64 = 0.125;
 
-/// Least share of the variance that causes explain, found or believed, where a cause acts: a thirtieth in amplitude. No law
-/// holds more exactly on a machine.
+/// Least share of the variance that causes explain where a cause acts: a thirtieth in amplitude. No law holds more exactly on a
+/// machine.
 const LEAST_SHARE: f64 = 0.001;
 
 /// Beats in a recording below which two vibrations are one that comes and goes.
@@ -408,18 +408,19 @@ pub fn shrink(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped
 /// the law that the others follow. Where it acts, since a law errs where it acts itself; a friction that builds up in some µm
 /// after each reversal is gone elsewhere, and large where it is.
 fn slight(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
-    // Mean square of what the part explains over that of all that is explained, each row by the square of the part.
+    // Mean square of what the part explains over that by which all that is explained may be off, each row by the square of the part.
     let share = |less: &Fit| {
-        let rows = less.residual.iter().zip(&fit.residual).zip(bench.measured.iter().zip(&bench.known));
-        let (own, all) = rows.fold((0.0, 0.0), |(own, all), ((less, left), (measured, known))| {
+        let rows = less.residual.iter().zip(&fit.residual).zip(bench.measured.iter().zip(&bench.doubt));
+        let (own, off) = rows.fold((0.0, 0.0), |(own, off), ((less, left), (measured, doubt))| {
             let square = (less - left).powi(2);
-            (own + square * square, all + square * (known + measured - left).powi(2))
+            let off_here = LEAST_SHARE * (measured - left).powi(2) + doubt * doubt;
+            (own + square * square, off + square * off_here)
         });
-        if all > 0.0 { own / all } else { f64::INFINITY }
+        if off > 0.0 { own / off } else { f64::INFINITY }
     };
     let shares: Vec<f64> = without.iter().map(share).collect();
     let weakest = (0..shares.len()).min_by(|&a, &b| shares[a].total_cmp(&shares[b]))?;
-    (shares[weakest] < LEAST_SHARE).then_some(weakest)
+    (shares[weakest] < 1.0).then_some(weakest)
 }
 
 /// The part of which least is known that it is there at all. What halves the rest of a channel is there, however little is

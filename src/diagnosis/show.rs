@@ -26,6 +26,8 @@ pub struct View {
 
 /// Share of its variance from which a residual is said to go with a coordinate.
 const TIED: f64 = 0.05;
+/// Variance above the noise floor, in units of the floor's, from which on it is said where a residual lives.
+const LITTLE: f64 = 0.5;
 
 /// What a residual may go with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -140,9 +142,10 @@ pub fn is_tied(bench: &Bench, fit: &Fit) -> bool {
     views(bench, fit, fit).iter().any(|view| view.after > TIED)
 }
 
-/// What is left, in a few words; `excess` is the variance above the noise floor, in units of the floor's.
+/// What is left, in a few words; `above` is the variance above the noise floor, in units of the floor's, and `excess` what of it
+/// is more than what is believed may be off by.
 #[must_use]
-pub fn describe(views: &[View], excess: f64) -> String {
+pub fn describe(views: &[View], above: f64, excess: f64) -> String {
     let mut list: Vec<&View> = views.iter().filter(|view| view.after > TIED).collect();
     list.sort_by(|a, b| b.after.total_cmp(&a.after));
     let strong: Vec<String> = list
@@ -150,7 +153,8 @@ pub fn describe(views: &[View], excess: f64) -> String {
         .take(3)
         .map(|view| format!("{} ({:.0} % of its variance)", view.coordinate.name(), 100.0 * view.after))
         .collect();
-    match (excess > 0.5, strong.is_empty()) {
+    match (excess > LITTLE, strong.is_empty()) {
+        (false, _) if above > LITTLE => "no more than what is believed may be off by".to_owned(),
         (false, _) => "white".to_owned(),
         (true, true) => "above the noise floor, but tied to no coordinate".to_owned(),
         (true, false) => format!("lives in {}", strong.join(", ")),

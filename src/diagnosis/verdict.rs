@@ -9,9 +9,10 @@ use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
 use super::gain::{self, Gain, Holdout};
 use super::judge::{Excess, Judge, Judged, refutation, refuted, rms, shows};
-use super::known;
+use super::known::Known;
 use super::narrow::{self, Band};
 use super::progress::{Progress, Stopped, Watch};
+use super::reopened;
 use super::select::{Search, Selection};
 use super::show::{self, View};
 use super::uncertainty;
@@ -124,24 +125,28 @@ pub fn diagnose(
         Err(why) => return Ok(insufficient(axis, vec![why.to_string()])),
     };
     let notes = whole.notes(recording, axis);
-    if let Err(why) = axis.two_masses() {
-        return Ok(insufficient(axis, vec![format!("a machine file that holds together: {why}")]));
-    }
+    let masses = match axis.two_masses() {
+        Ok(masses) => masses,
+        Err(why) => return Ok(insufficient(axis, vec![format!("a machine file that holds together: {why}")])),
+    };
     let columns = whole.clone().thinned();
     let base = belief::base_alone(axis);
     let frame = Frame::new(&base, &columns, None);
+    let frame = masses.iter().fold(frame, |frame, masses| frame.after_first_swings(masses));
     let missing = what_is_missing(&frame);
     if !missing.is_empty() {
         return Ok(Diagnosis { notes, ..insufficient(axis, missing) });
     }
     watch.at(0.05, "reading the motion")?;
-    let recorded = Recorded { axis, whole: &whole, holdout, watch: &watch };
+    let recorded = Recorded { axis, belief: axis, whole: &whole, holdout, watch: &watch };
     answer(&recorded, &frame, notes)
 }
 
 /// What an answer is about beside the equations.
 struct Recorded<'d> {
     axis: &'d Axis,
+    /// What of the axis is taken for granted.
+    belief: &'d Axis,
     whole: &'d Columns,
     holdout: Option<&'d Recording>,
     watch: &'d Watch<'d>,
@@ -149,8 +154,17 @@ struct Recorded<'d> {
 
 /// The answer on one system of equations; on aligned ones where the torque column turns out to be late by its sampling.
 fn answer(recorded: &Recorded, frame: &Frame, notes: Vec<String>) -> Result<Diagnosis, Stopped> {
-    let bench = Bench::new(frame, &known::trace(recorded.axis, frame));
+    let bench = Bench::new(frame, &Known::of(recorded.belief, frame));
     let found = answer_on(recorded, &bench, None, notes.clone())?;
+    let Recorded { axis, belief, .. } = recorded;
+    if matches!(found.verdict, Verdict::UnknownCause | Verdict::NoDiscrepancy) && axis == belief {
+        if let Some(belief) = &reopened::without_misjudged(axis, frame, &bench) {
+            let again = answer(&Recorded { belief, ..*recorded }, frame, notes.clone())?;
+            if !again.findings.is_empty() {
+                return Ok(again);
+            }
+        }
+    }
     let open = matches!(found.verdict, Verdict::UnknownCause | Verdict::PartlyExplained);
     if let Some(band) = open.then(|| narrow::band(&bench)).flatten() {
         let beside = bench.beside_lines(&band.columns);
@@ -170,10 +184,10 @@ fn answer_on(
     vibration: Option<&Band>,
     mut notes: Vec<String>,
 ) -> Result<Diagnosis, Stopped> {
-    let &Recorded { axis, whole, holdout, watch } = recorded;
+    let &Recorded { axis, belief, whole, holdout, watch } = recorded;
     let frame = bench.frame;
     let empty = bench.fit(Vec::new());
-    let laws: Vec<&'static Law> = LAWS.iter().copied().filter(|law| belief::may_be_found(axis, law.cause)).collect();
+    let laws: Vec<&'static Law> = LAWS.iter().copied().filter(|law| belief::may_be_found(belief, law.cause)).collect();
     let judge = || Ok(Judge::new(axis, whole, bench, watch));
     let (judge, search) = watch.both(judge, || Search::new(bench, &laws, watch))?;
     let found = search.from_belief()?;
@@ -266,10 +280,11 @@ fn unexplained(bench: &Bench, fit: &Fit, shown: &[View]) -> Unexplained {
     let excess = Excess::of(bench, fit, fit);
     // Of nothing there is no noise.
     let noise = |rest: &[f64], torque| if rms(rest) > 0.0 { bench.frame.floor(rest, torque) } else { 0.0 };
+    let above_noise = |rest: &[f64], torque| (rms(rest) / noise(rest, torque)).powi(2) - 1.0;
     let left = |rest: &[f64], channel: usize, views: &[View]| Left {
         rms: rms(rest),
         noise_rms: noise(rest, channel == 0),
-        describes: show::describe(views, excess.of_channel(channel)),
+        describes: show::describe(views, above_noise(rest, channel == 0), excess.of_channel(channel)),
     };
     let of_table = || left(&table, 1, &show::against_all(bench.frame, &table, &table));
     Unexplained { torque: left(&torque, 0, shown), table: (!table.is_empty()).then(of_table) }

@@ -1,5 +1,10 @@
 //! Elastic drive: motor and table are two masses on a spring, with the resonance ω² = k·(1/J₁ + 1/J₂). Seen from the motor,
 //! the table's inertia weighs more towards the antiresonance √(k/J₂) and less above it; at a reversal the drive winds up.
+//!
+//! Behind a motor that moves as measured the table swings at its own frequency, the antiresonance, with a damping of its own and
+//! under the friction on its own mass; what the motor feels of that grows with the table's mass. So these are what is fitted:
+//! whatever is changed of one of them, the best of the others stays about where it is. By the resonance, which moves with every
+//! mass, the way down is a bent valley.
 
 use super::table_side;
 use super::*;
@@ -10,6 +15,9 @@ use std::f64::consts::TAU;
 /// found no swing, and imitates what else happens at reversals.
 const MOST_DAMPING: f64 = 0.3;
 
+/// Share of the friction that the table has at most.
+const MOST_FRICTION: f64 = 1.0;
+
 /// Fastest resonance that is looked for, Hz.
 const FASTEST_HZ: f64 = 2000.0;
 
@@ -19,14 +27,17 @@ const STEP: f64 = 1.08;
 /// Shares of inertia and friction on the table's side at a start.
 const SHARE: f64 = 0.5;
 const FRICTION_SHARE: f64 = 0.7;
+/// Damping ratio there.
+const DAMPING: f64 = 0.03;
 
-/// Parameters: resonance in Hz, share of the inertia and of the friction on the table's side, damping ratio.
+/// Parameters: the table's own frequency in Hz, share of the inertia on the table's side, share of the friction there over that,
+/// damping ratio of the table's own swing.
 pub static LAW: Law = Law {
     cause: Cause::DriveCompliance,
     scales: &[
-        Scale::Log(3.0, FASTEST_HZ),
+        Scale::Log(2.0, FASTEST_HZ),
         Scale::Linear(0.04, 0.95, 0.01),
-        Scale::Linear(0.02, 0.98, 0.02),
+        Scale::Log(0.02, 25.0),
         Scale::Log(2e-3, MOST_DAMPING),
     ],
     starts: |frame, rest| {
@@ -36,15 +47,14 @@ pub static LAW: Law = Law {
         let count = ((most / least).ln() / STEP.ln()).ceil().max(2.0) as usize;
         let swinging = log_spaced(least, most, count);
         let own = swinging.chain(wound_up(frame, rest.table).filter(|own| *own > most));
-        own.map(|own| vec![own / (1.0 - SHARE).sqrt(), SHARE, FRICTION_SHARE, 0.04]).collect()
+        own.map(|own| vec![own, SHARE, FRICTION_SHARE / SHARE, DAMPING]).collect()
     },
     manner: Manner {
         // How the table swings by itself is found sooner than what is whose: a fit that damps it until it hardly swings has found the one
         // and strayed in the other.
         restarts: |shape| {
-            let [resonance, share, ..] = shape else { return Vec::new() };
-            let own = resonance * (1.0 - share).sqrt();
-            let at = |share: f64| [0.5, 0.95].map(|friction| vec![own / (1.0 - share).sqrt(), share, friction, 0.04]);
+            let Some(&own) = shape.first() else { return Vec::new() };
+            let at = |share: f64| [0.5, 0.95].map(|friction| vec![own, share, friction / share, DAMPING]);
             [0.2, 0.45, 0.7, 0.85].into_iter().flat_map(at).collect()
         },
         simulated: true,
@@ -55,8 +65,8 @@ pub static LAW: Law = Law {
         table_side::terms(frame, &effects)
     },
     effect: |frame, shape, _| {
-        let swings = shape.last().is_some_and(|damping_ratio| *damping_ratio < 0.9 * MOST_DAMPING);
-        effect(frame, shape).filter(|_| swings)
+        let swings = |found: &Effect| matches!(found, Effect::DriveCompliance { damping_ratio, .. } if *damping_ratio < 0.9 * MOST_DAMPING);
+        effect(frame, shape).filter(swings)
     },
     confused_with: &[Cause::InertiaMismatch, Cause::Backlash, Cause::PreslidingFriction],
     sentence: |effect, axis| match effect {
@@ -71,7 +81,10 @@ pub static LAW: Law = Law {
 };
 
 fn effect(frame: &Frame, shape: &[f64]) -> Option<Effect> {
-    let [resonance_hz, table_inertia_share, table_friction_share, damping_ratio] = shape.try_into().ok()?;
+    let [own_hz, table_inertia_share, rubbing, own_damping]: [f64; 4] = shape.try_into().ok()?;
+    let faster = (1.0 - table_inertia_share).sqrt().recip();
+    let (resonance_hz, damping_ratio) = (own_hz * faster, own_damping * faster);
+    let table_friction_share = (rubbing * table_inertia_share).min(MOST_FRICTION);
     let omega: f64 = TAU * resonance_hz;
     let stiffness = omega * omega * frame.belief.inertia * table_inertia_share * (1.0 - table_inertia_share);
     let stiffness_n_um = stiffness / frame.axis.drive.motor_stiffness(1.0);

@@ -16,6 +16,7 @@ use crate::diagnosis::sampling::NUMEROV;
 use crate::machine::TwoMasses;
 use spring::MOST_STEPS;
 use std::cell::RefCell;
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// The traces in the torque (against the rigid axis) and in table − encoder, of each effect.
@@ -28,6 +29,15 @@ pub fn terms(frame: &Frame, effects: &[Option<Effect>]) -> Vec<Term> {
 pub fn believed(frame: &Frame, axis: &Axis) -> Option<Trace> {
     let masses = axis.two_masses().ok().flatten()?;
     terms_of(frame, &[Some(masses)]).swap_remove(0).fixed
+}
+
+/// How a table swings behind a spring, as the law of an elastic drive has it: its own frequency, Hz, the share of the inertia, the
+/// share of the friction over that, and its own damping ratio.
+pub fn swing_of(masses: &TwoMasses) -> Vec<f64> {
+    let own = (masses.stiffness / masses.table_inertia).sqrt();
+    let share = masses.table_inertia / (masses.table_inertia + masses.motor_inertia);
+    let damping_ratio = 0.5 * masses.damping / (masses.table_inertia * own);
+    vec![own / TAU, share, masses.table_friction_share / share, damping_ratio]
 }
 
 fn terms_of(frame: &Frame, splits: &[Option<TwoMasses>]) -> Vec<Term> {

@@ -18,7 +18,8 @@ impl<'f, 'a> Bench<'f, 'a> {
     pub fn beside(&self, regressors: Vec<Vec<f64>>) -> Beside<'f, 'a> {
         let mut directions: Vec<Vec<f64>> = Vec::with_capacity(regressors.len());
         for mut column in regressors {
-            column.iter_mut().zip(&self.frame.weights).for_each(|(c, weight)| *c *= weight);
+            let weights = self.frame.weights.iter().zip(&self.certain);
+            column.iter_mut().zip(weights).for_each(|(c, (weight, certain))| *c *= weight * certain);
             let (direction, weights) = orthonormal(&column, &directions, &[]);
             if weights[directions.len()] > 0.0 {
                 directions.push(direction);
@@ -26,11 +27,11 @@ impl<'f, 'a> Bench<'f, 'a> {
         }
         let mut measured = self.measured.clone();
         clear(&mut measured, &directions);
-        let (known, windows) = (self.known.clone(), self.windows.clone());
+        let (doubt, certain, windows) = (self.doubt.clone(), self.certain.clone(), self.windows.clone());
         let mut free = self.free.clone();
         free.iter_mut().for_each(|column| clear(column, &directions));
         let free = orthonormalised(free);
-        Beside { bench: Self { measured, known, free, windows, ..*self }, directions }
+        Beside { bench: Self { measured, doubt, certain, free, windows, ..*self }, directions }
     }
 }
 
@@ -39,8 +40,8 @@ impl Bench<'_, '_> {
     #[must_use]
     pub fn beside_lines(&self, columns: &[Vec<f64>]) -> Self {
         let free = orthonormalised(self.free.iter().chain(columns).cloned().collect());
-        let (measured, known, windows) = (self.measured.clone(), self.known.clone(), self.windows.clone());
-        Self { measured, known, free, windows, ..*self }
+        let (doubt, certain, windows) = (self.doubt.clone(), self.certain.clone(), self.windows.clone());
+        Self { measured: self.measured.clone(), doubt, certain, free, windows, ..*self }
     }
 
     /// What these columns together take of the measurement.

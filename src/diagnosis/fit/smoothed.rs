@@ -36,9 +36,9 @@ impl Bench<'_, '_> {
             }
         }
         let sum = |column: &[f64]| summed(column.to_vec(), kept.len(), &windows);
-        let (measured, known) = (sum(&self.measured), sum(&self.known));
+        let (measured, doubt) = (sum(&self.measured), sum(&self.doubt));
         let free = orthonormalised(self.free.iter().map(|column| unit(sum(column))).collect());
-        Self { measured, known, free, rows: windows.len(), windows, ..*self }
+        Self { measured, doubt, certain: self.certain.clone(), free, rows: windows.len(), windows, ..*self }
     }
 
     /// A set of causes fitted on other equations of the same rows, on these.
