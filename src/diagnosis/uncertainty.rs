@@ -8,6 +8,7 @@
 //! blocks effectively take part (Imbens and Kolesár 2016).
 
 use super::blocks;
+use super::causes::table_side;
 use super::causes::thermal_drift::SLOWEST;
 use super::fit::{Bench, Fit, Part, Slope, pseudo_inverse};
 use super::many::dot;
@@ -120,17 +121,32 @@ pub fn effects(bench: &Bench, fit: &Fit) -> Vec<Option<(Effect, Vec<f64>)>> {
                 let rate = scale.rate(part.shape[slope.index]);
                 differ(first_slope + s, step / rate, effect_of(&shape, &fit.coefficients[i]));
             }
+            // A number that stopped at its bound may be anything within them: blocks that agree on the bound know no better.
+            let own_slopes = slopes.iter().enumerate().filter(|(_, slope)| slope.part == i);
+            let ends: Vec<(usize, f64)> = own_slopes
+                .filter_map(|(s, slope)| {
+                    let range = part.law.scales[slope.index].stopped_between(part.shape[slope.index])?;
+                    Some((first_slope + s, range / 1.96))
+                })
+                .collect();
             let widened = if part.law.manner.simulated { SIMULATED * misfit } else { 1.0 };
             let own = coefficient_at[i]..coefficient_at[i] + fit.coefficients[i].len();
             let deviation = |k: usize| {
                 let by_coefficients =
                     own.clone().zip(&fit.coefficients[i]).map(|(u, c)| (gradient[(k, u)] * c).powi(2)).sum::<f64>();
                 let size = if own.is_empty() { values[k].abs() } else { by_coefficients.sqrt() };
-                (widened * spread.deviation(&gradient.row(k).transpose())).hypot(LAW_HOLDS * size)
+                let by_blocks = (widened * spread.deviation(&gradient.row(k).transpose())).hypot(LAW_HOLDS * size);
+                ends.iter().fold(by_blocks, |all, (unknown, range)| all.hypot(gradient[(k, *unknown)] * range))
             };
             let mut deviations: Vec<f64> = (0..values.len()).map(deviation).collect();
-            if let (Effect::DeadTime { .. }, [deviation]) = (effect, deviations.as_mut_slice()) {
-                *deviation = deviation.hypot(1e3 * bench.frame.sampling.deviation_s());
+            match (effect, deviations.as_mut_slice()) {
+                (Effect::DeadTime { .. }, [deviation]) => {
+                    *deviation = deviation.hypot(1e3 * bench.frame.sampling.deviation_s());
+                }
+                (Effect::DriveCompliance { .. }, [.., deviation]) => {
+                    *deviation = deviation.hypot(table_side::open_damping(bench.frame, &effect));
+                }
+                _ => {}
             }
             // At its bound a time constant may be any longer one.
             if let (Effect::ThermalDrift { time_constant_s, .. }, [_, deviation, _]) =

@@ -40,6 +40,18 @@ pub fn swing_of(masses: &TwoMasses) -> Vec<f64> {
     vec![own / TAU, share, masses.table_friction_share / share, damping_ratio]
 }
 
+/// Standard deviation of a spring's damping ratio by what nobody knows: viscous friction may act on the motor or on the table, where
+/// it damps the table's swing as the spring's own damping does, and need not be shared as dry friction is.
+pub fn open_damping(frame: &Frame, effect: &Effect) -> f64 {
+    let Ok(Some(m)) = frame.axis.with_effects(vec![*effect]).two_masses() else { return 0.0 };
+    // Any share of it on the table alike.
+    let viscous = frame.belief.viscous * (1.0 / 12.0 + (m.table_friction_share - 0.5).powi(2)).sqrt();
+    let swing = (m.stiffness * m.table_inertia).sqrt();
+    // The own damping ratio of the table over that of the two masses is as their frequencies.
+    let faster = ((m.motor_inertia + m.table_inertia) / m.motor_inertia).sqrt();
+    0.5 * viscous / swing * faster
+}
+
 fn terms_of(frame: &Frame, splits: &[Option<TwoMasses>]) -> Vec<Term> {
     let sound: Vec<TwoMasses> = splits.iter().copied().flatten().collect();
     let together = |masses: &[TwoMasses]| match masses {

@@ -153,6 +153,15 @@ impl Scale {
         }
     }
 
+    /// How far apart the bounds are, in the units of the scale, where a value has come within a step of one; of what is large or
+    /// small without bounds that mean anything nothing can be said.
+    pub(in crate::diagnosis) fn stopped_between(self, value: f64) -> Option<f64> {
+        match self {
+            Scale::Linear(low, high, unit) if value <= low + unit || value >= high - unit => Some(high - low),
+            _ => None,
+        }
+    }
+
     fn distance(self, from: f64, to: f64) -> f64 {
         match self {
             Scale::Choice => 0.0,
