@@ -276,6 +276,8 @@ static void see_world(homing_adversary *a, const gib_homing_input *in)
                     ever(a, FAULT_ENCODER_JUMPS) || struck(a);
     /* After the end the kernel's servo may pull at what still holds the axis. */
     unlimited |= a->ended && ever(a, FAULT_TIGHT_SPOT);
+    /* Then a command of rest follows the encoder, a step of which is a speed that the servo answers. */
+    double answer = a->ended ? p->c.velocity_gain_nm_s_mm * p->c.encoder_mm / p->c.cycle_s : 0.0;
     for (int i = 0; i < p->c.motors; i++) {
         const homing_plant_side *s = &p->side[i];
         double lie = s->x - p->c.sense * in->position_mm[i];
@@ -288,7 +290,7 @@ static void see_world(homing_adversary *a, const gib_homing_input *in)
         /* A drive that limits late takes the time of its current loop to come down. */
         int falls = a->limited && fabs(s->torque) < a->torque_nm[i];
         a->torque_nm[i] = fabs(s->torque);
-        law(a, unlimited || falls || fabs(s->torque) <= g->torque_limit_nm + 1e-9, "the torque limit");
+        law(a, unlimited || falls || fabs(s->torque) <= g->torque_limit_nm + answer + 1e-9, "the torque limit");
     }
 }
 
@@ -400,7 +402,7 @@ static void see_restored(homing_adversary *a)
 
 /* Homed in spite of troubles: home is right, as far as gib can know: of a stop that is another, a jump that a motor may make in a
  * cycle, or that comes out only after the end since the encoder stood, what an encoder slips once the last touch is over, and a
- * position that a kernel does not set and need not confirm, it cannot. */
+ * position that a kernel does not set and need not confirm, or confirms by chance, it cannot. */
 static void see_home(homing_adversary *a)
 {
     const homing_plant *p = &a->world.plant;
@@ -409,7 +411,7 @@ static void see_home(homing_adversary *a)
     double approach = given(g->approach_speed_mm_s, 1.0), offset = given(g->zero_offset_speed_mm_s, approach);
     int hidden = lasts_till(a, FAULT_ENCODER_FROZEN, a->ended) || 0.01 + 10.0 * fmax(approach, offset) * c->cycle_s > 0.3;
     int jumped = ever(a, FAULT_ENCODER_JUMPS) && hidden;
-    int unset = (g->unacknowledged & GIB_HOMING_REQUEST_SET_POSITION) && ever(a, FAULT_NO_ACKNOWLEDGEMENT);
+    int unset = ((g->unacknowledged & GIB_HOMING_REQUEST_SET_POSITION) || ever(a, ANSWERS_WILDLY)) && ever(a, FAULT_NO_ACKNOWLEDGEMENT);
     /* A torque that stands for a part of the only touch: no other disagrees with it. */
     int unequalled = g->touches == 1 && ever(a, FAULT_TORQUE_STUCK_HIGH);
     if (jumped || unset || unequalled || ever(a, FAULT_STOP_EARLY) || ever(a, FAULT_CHIPS) || c->stop_mm[0] != c->stop_mm[1] ||
