@@ -99,6 +99,32 @@ static void measures_and_writes(void **state)
     }
 }
 
+/* A load that leans on the table, as of a spindle head without a full counterweight, does not hide the clearance: where it helps the
+ * motion, the motor crosses the clearance at a torque near to sliding. */
+static void a_load_hides_no_clearance(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 4; i++) {
+        bench *b = bench_new();
+        plant_config axis = plant_default();
+        axis.motor_share = 0.35;
+        axis.clearance_mm = 0.05;
+        axis.constant_nm = i % 2 ? 0.9 : -0.9;
+        plant_init(&b->axis, &axis);
+        gib_backlash_config c = quick_config();
+        c.one_direction = 1;
+        c.first_direction = i / 2 ? -1 : 1;
+        c.mode = i / 2 ? GIB_BACKLASH_STEP : GIB_BACKLASH_SLOW_FEED;
+        assert_int_equal(gib_backlash_start(b->gib, &c), GIB_OK);
+        assert_int_equal(run(b), GIB_DONE);
+        gib_backlash_report r = report_of(b);
+        double truth = plant_true_lost_motion_um(&axis);
+        assert_true(fabs(r.mean.lost_motion_um - truth) <= 1.5 * r.mean.uncertainty_um);
+        assert_true(r.mean.uncertainty_um < 0.05 * truth && fabs(r.mean.clearance_um - 50.0) < 2.5);
+        bench_free(b);
+    }
+}
+
 static void curve_is_readable(void **state)
 {
     (void)state;
@@ -347,6 +373,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(measures_and_writes),
+        cmocka_unit_test(a_load_hides_no_clearance),
         cmocka_unit_test(curve_is_readable),
         cmocka_unit_test(measure_only_writes_nothing),
         cmocka_unit_test(one_direction_and_peak),

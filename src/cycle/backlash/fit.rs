@@ -82,6 +82,8 @@ const TRIALS: usize = 2;
 const SLICE: usize = 8;
 /// Gauss–Newton steps.
 const STEPS: u32 = 16;
+/// Fewest bins on each slope: with less the kink beside it means nothing.
+const FEWEST_BINS: f64 = 3.0;
 /// First bins left out: the motor's friction turns its sign there.
 const SKIP: f64 = 2.0;
 
@@ -124,8 +126,12 @@ pub struct Fit {
     share: usize,
     first: usize,
     end: usize,
+    /// One past the bin at which the smoothed curve last passed each share on its way to sliding; `usize::MAX`: not.
     ends: [usize; SHARES.len()],
+    /// The same on the way that it is on.
+    passed: [usize; SHARES.len()],
     smooth: f64,
+    highest: f64,
     best: Trial,
     chosen: Option<Fitted>,
     sums: [Moments; BINS + 1],
@@ -140,7 +146,9 @@ impl Default for Fit {
             first: 0,
             end: 0,
             ends: [0; SHARES.len()],
+            passed: [0; SHARES.len()],
             smooth: 0.0,
+            highest: 0.0,
             best: NO_TRIAL,
             chosen: None,
             sums: [Moments::default(); BINS + 1],
@@ -155,7 +163,9 @@ impl Fit {
         self.share = 0;
         self.first = 0;
         self.ends = [usize::MAX; SHARES.len()];
+        self.passed = self.ends;
         self.smooth = levels.before;
+        self.highest = f64::NEG_INFINITY;
         self.chosen = None;
         self.stage = Stage::Sum { bin: 0 };
     }
@@ -193,12 +203,16 @@ impl Fit {
         &self.sums[bins.min(BINS)]
     }
 
-    /// Running sums, and where the smoothed curve first passes each share of the wind-up.
+    /// Running sums, and where the smoothed curve passes each share of the wind-up. Where the motor runs into a clearance it
+    /// may pass some for a moment.
     fn sum(&mut self, curve: &Curve, from: usize) {
         const SMOOTHING: f64 = 0.3; // about three bins
+        const SLIDING: f64 = 0.85; // from there on a reading may fall again: the table sticks and slips
         let to = (from + SLICE).min(curve.used());
-        let spring_zero = 0.5 * (self.levels.before + self.levels.after);
-        let half = 0.5 * self.levels.spring_change();
+        // The rise starts at the motor's friction, and at more where the middle of the levels is a torque sensor's zero
+        // and not a load; it ends at sliding.
+        let from_level = self.levels.motor + (0.5 * (self.levels.before + self.levels.after)).max(0.0);
+        let rise = self.levels.after - from_level;
         for bin in from..to {
             let mut sums = *self.running(bin);
             if bin == 0 {
@@ -207,12 +221,13 @@ impl Fit {
             if let Some((n, s, t)) = curve.point(bin) {
                 sums = sums.with(n, s, t);
                 self.smooth += SMOOTHING * (t - self.smooth);
-                // The rise starts at spring zero plus the motor's friction and gains `half` up to sliding.
-                let share = (self.smooth - spring_zero - self.levels.motor) / half;
-                for (end, wanted) in self.ends.iter_mut().zip(SHARES) {
-                    if *end == usize::MAX && share >= wanted {
-                        *end = bin + 1;
-                    }
+                let share = (self.smooth - from_level) / rise;
+                for (passed, wanted) in self.passed.iter_mut().zip(SHARES) {
+                    *passed = if share >= wanted { (*passed).min(bin + 1) } else { usize::MAX };
+                }
+                if share > self.highest && self.highest < SLIDING {
+                    self.highest = share;
+                    self.ends = self.passed;
                 }
             }
             self.sums[(bin + 1).min(BINS)] = sums;
@@ -227,12 +242,11 @@ impl Fit {
 
     /// Sets up the search for the next share that the curve reaches.
     fn next_share(&mut self, curve: &Curve, from: usize) -> Stage {
-        const FEWEST_BINS: f64 = 6.0;
         for share in from..SHARES.len() {
             let end = self.ends[share].min(curve.used());
             let reached = self.ends[share] != usize::MAX;
             let bins = self.running(end).since(self.running(self.first)).bins;
-            if reached && end > self.first && bins >= FEWEST_BINS {
+            if reached && end > self.first && bins >= 2.0 * FEWEST_BINS {
                 self.share = share;
                 self.end = end;
                 self.best = NO_TRIAL;
@@ -260,7 +274,6 @@ impl Fit {
 
     /// Best c and k for given kinks.
     fn trial(&self, curve: &Curve, s1: f64, s2: f64) -> Trial {
-        const FEWEST_BINS: f64 = 3.0; // on each slope, or the kink beside it means nothing
         let (a, b, all) = self.parts(curve, s1, s2);
         if s2 > s1 && a.bins.min(b.bins) < FEWEST_BINS {
             return NO_TRIAL;
@@ -412,7 +425,16 @@ impl Fit {
         }
         // Kinks that meet leave their distance open: its uncertainty is that of kinks a tenth of the stretch apart.
         let apart = 0.5 * (0.1 * (self.end - self.first) as f64 * curve.width_mm() - (t.s2 - t.s1)).max(0.0);
-        let (matrix, _) = self.normal(curve, &Trial { s1: t.s1 - apart, s2: t.s2 + apart, ..t });
+        let wider = |down: f64, up: f64| Trial { s1: t.s1 - down * apart, s2: t.s2 + up * apart, ..t };
+        let (before, after, _) = self.parts(curve, t.s1 - apart, t.s2 + apart);
+        let (matrix, _) = self.normal(
+            curve,
+            &match () {
+                () if before.bins < FEWEST_BINS => wider(0.0, 2.0),
+                () if after.bins < FEWEST_BINS => wider(2.0, 0.0),
+                () => wider(1.0, 1.0),
+            },
+        );
         let scale = noise * inflation;
         // d(lost motion)/d(c, k, s1, s2); the levels come from other samples.
         let gradient = [0.0, -change / (t.k * t.k), -1.0, 1.0];

@@ -180,7 +180,7 @@ impl Sense {
         let nm = plan.torque_nm;
         BacklashEstimate {
             lost_motion_um: self.sum / n * um,
-            uncertainty_um: 2.0 * (self.variance_of_mean() + systematic(plan, encoder)).sqrt() * um,
+            uncertainty_um: 2.0 * (self.variance_of_mean() + systematic(plan, encoder, self.sum / n)).sqrt() * um,
             clearance_um: clearance * um,
             windup_um: self.windup / n * um,
             standstill_um: (clearance + self.held / n + far) * um,
@@ -205,10 +205,14 @@ impl Sense {
 
 /// Variance that no repetition takes away, mm²: each end of the lost motion lies somewhere on the encoder's grid q,
 /// the same in every repeat (2·q²/12), a kink somewhere in its bin of the curve, and in step mode a motor with friction
-/// of its own sticks somewhere in its step when the torque is read (step²/12), and does so alike in every repeat.
-fn systematic(plan: &Plan, encoder: f64) -> f64 {
+/// of its own sticks somewhere in its step when the torque is read (step²/12), and does so alike in every repeat. And a real curve
+/// is not quite the model's: creep, damping and a servo that swings bend it by a share of `lost_motion` (mm).
+fn systematic(plan: &Plan, encoder: f64, lost_motion: f64) -> f64 {
+    /// Standard deviation of that: on random axes 95 of 100 intervals hold with it, and 88 without.
+    const BENT: f64 = 0.005;
     let step = if plan.slow_feed { 0.0 } else { plan.step };
-    encoder * encoder / 6.0 + plan.bin * plan.bin / 24.0 + step * step / 12.0
+    let bent = BENT * lost_motion;
+    encoder * encoder / 6.0 + plan.bin * plan.bin / 24.0 + step * step / 12.0 + bent * bent
 }
 
 /// Estimates of both senses and their mean; a sense that was not measured is all zero.
@@ -221,10 +225,11 @@ pub fn estimates(plan: &Plan, encoder: f64, senses: &[Sense; 2]) -> ([BacklashEs
     let second = senses[1].estimate(plan, encoder, &senses[0]);
     let half = |a: f64, b: f64| 0.5 * (a + b);
     let root = |a: f64, b: f64| 0.5 * (a * a + b * b).sqrt();
+    let lost_motion = 1e-3 * half(first.lost_motion_um, second.lost_motion_um);
     let scatter = 0.25 * (senses[0].variance_of_mean() + senses[1].variance_of_mean());
     let mean = BacklashEstimate {
         lost_motion_um: half(first.lost_motion_um, second.lost_motion_um),
-        uncertainty_um: 2.0e3 * (scatter + systematic(plan, encoder)).sqrt(),
+        uncertainty_um: 2.0e3 * (scatter + systematic(plan, encoder, lost_motion)).sqrt(),
         clearance_um: half(first.clearance_um, second.clearance_um),
         windup_um: half(first.windup_um, second.windup_um),
         standstill_um: half(first.standstill_um, second.standstill_um),

@@ -1,6 +1,5 @@
 //! The measuring states: what happens in a cycle of each, and what comes after it.
 
-use super::readings::RISE_LOW;
 use super::*;
 use crate::cycle::backlash::{curve, verdict};
 
@@ -202,7 +201,7 @@ impl Backlash {
         let torque = self.sense * input.torque;
         self.curve_mut().add(travel, torque);
         self.watch.add(travel, torque, &self.plan);
-        if over || travel >= self.watch.end {
+        if over || (travel >= self.watch.end && self.watch.slides(travel, &self.plan)) {
             self.end_scan(input, travel);
         }
     }
@@ -217,12 +216,12 @@ impl Backlash {
     /// The table slides, or the limit is reached before it did.
     #[cold]
     fn end_scan(&mut self, input: &BacklashInput, travel: f64) {
-        if self.watch.highest > RISE_LOW && travel < self.plan.limit {
+        let (found, low) = (self.watch.highest, self.watch.low);
+        if found > low && travel < self.plan.limit {
             return self.probe_back(input);
         }
-        let found = self.watch.highest;
-        let code = if found > RISE_LOW { GIB_ERR_BACKLASH_LIMIT } else { GIB_ERR_BACKLASH_NO_RISE };
-        self.leave(Fault { code, field: "detection_limit_um\0", value: found, low: RISE_LOW, high: 1.0 });
+        let code = if found > low { GIB_ERR_BACKLASH_LIMIT } else { GIB_ERR_BACKLASH_NO_RISE };
+        self.leave(Fault { code, field: "detection_limit_um\0", value: found, low, high: 1.0 });
     }
 
     /// Sliding is reached: will go back by a share of the way, where the table still sticks.

@@ -3,9 +3,12 @@
 use crate::cycle::backlash::curve::Moments;
 use crate::cycle::backlash::plan::Plan;
 
-/// Share of sliding at which the wind-up has certainly begun, and one further up: their distance scales the probe.
-pub(super) const RISE_LOW: f64 = 0.5;
-const RISE_HIGH: f64 = 0.65;
+/// Share of sliding at which the wind-up has certainly begun where nothing but friction loads the table, and how far up
+/// the one is that scales the probe.
+const RISE_LOW: f64 = 0.5;
+const RISE_HIGH: f64 = 0.15;
+/// Most that a constant load moves them up.
+const MOST_LEAN: f64 = 0.35;
 /// Growth of the smoothed torque, as a share of sliding, that is worth a look.
 const LEAST_NEWS: f64 = 0.03;
 /// Points of the curve, and share of the way, without growth after which the table is sliding.
@@ -23,7 +26,10 @@ pub(super) struct Watch {
     pub(super) news: f64,
     pub(super) margin: f64,
     pub(super) highest: f64,
-    /// Travel at which the reading passed `RISE_HIGH`; 0 before.
+    /// Reading at which the wind-up has certainly begun, and one further up.
+    pub(super) low: f64,
+    high: f64,
+    /// Travel at which the reading passed `high`; 0 before.
     pub(super) high_at: f64,
     /// Travel at which the scan ends unless there is news.
     pub(super) end: f64,
@@ -51,7 +57,11 @@ impl Watch {
         // White noise of std σ has σ·√(gain/2) left after the smoothing; twice that is growth, not chance.
         let margin = LEAST_NEWS + 2.0 * noise * per_half * (0.5 * gain).sqrt();
         let middle = 0.5 * (before + after);
-        Watch { middle, per_half, smooth: -1.0, gain, news: -1.0, margin, highest: -1.0, high_at: 0.0, end: limit }
+        // Across a clearance the motor has its own friction to overcome, and no load that leans on the table: where that
+        // helps the motion, the clearance reads higher by its share.
+        let low = RISE_LOW + (-middle * per_half).clamp(0.0, MOST_LEAN);
+        let high = low + RISE_HIGH;
+        Watch { middle, per_half, smooth: -1.0, gain, news: -1.0, margin, highest: -1.0, low, high, high_at: 0.0, end: limit }
     }
 
     /// The smoothed torque once this sample is in.
@@ -72,13 +82,27 @@ impl Watch {
     fn grow(&mut self, travel: f64, plan: &Plan) {
         self.highest = self.smooth;
         self.news = self.smooth + self.margin;
-        if self.high_at == 0.0 && self.smooth > RISE_HIGH {
+        if self.high_at == 0.0 && self.smooth > self.high {
             self.high_at = travel;
         }
-        if self.smooth > RISE_LOW {
-            let stall = (STALL_POINTS * plan.step).max(STALL_SHARE * travel);
-            self.end = plan.limit.min(travel + stall);
+        if self.smooth > self.low {
+            self.go_on(travel, plan);
         }
+    }
+
+    fn go_on(&mut self, travel: f64, plan: &Plan) {
+        let stall = (STALL_POINTS * plan.step).max(STALL_SHARE * travel);
+        self.end = plan.limit.min(travel + stall);
+    }
+
+    /// Whether the table slides, where the scan has come to its end. A reading that has fallen was the motor's run into a
+    /// clearance: the scan goes on.
+    pub(super) fn slides(&mut self, travel: f64, plan: &Plan) -> bool {
+        if self.smooth < self.low && travel < plan.limit {
+            self.go_on(travel, plan);
+            return false;
+        }
+        true
     }
 }
 
