@@ -81,6 +81,7 @@ typedef struct {
     int run, cycle, ended, named;
     uint32_t asked_id, done_id, counted; /* requests asked for, carried out, made before this run */
     int asked_at;
+    double foreign_um; /* amount that somebody else set */
     double command_mm, late_mm[BACKLASH_LATEST];
     plant_reading stuck, past[BACKLASH_LATEST];
     gib_backlash_input told;

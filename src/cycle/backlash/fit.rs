@@ -22,6 +22,7 @@
 //! curve's length. The stretch used ends below the sliding level, at the largest share of the wind-up whose
 //! residuals show no structure, since near sliding the curve is rounded by creep and break-away.
 
+use super::cholesky::Cholesky;
 use super::curve::{BINS, Curve, Moments};
 
 /// What is known of a reversal besides its curve. Torques in the curve's unit and sense.
@@ -64,6 +65,8 @@ pub struct Fitted {
     pub stiffness_error: f64,
     /// Torque across the clearance.
     pub level: f64,
+    /// Its standard error.
+    pub level_error: f64,
     /// Standard deviation of one torque sample about the fitted curve.
     pub noise: f64,
     /// Share of the wind-up, from the clearance up, that was used.
@@ -441,6 +444,7 @@ impl Fit {
         let system = Cholesky::new(matrix)?;
         let fit_variance = scale * system.inverse_form(gradient);
         let k_variance = scale * system.inverse_form([0.0, 1.0, 0.0, 0.0]);
+        let level_variance = scale * system.inverse_form([1.0, 0.0, 0.0, 0.0]);
         let windup = change / t.k;
         let clearance = t.s2 - t.s1;
         let variance = fit_variance + self.levels.variance / (t.k * t.k);
@@ -453,6 +457,7 @@ impl Fit {
             stiffness: t.k,
             stiffness_error: k_variance.max(0.0).sqrt(),
             level: t.c,
+            level_error: level_variance.max(0.0).sqrt(),
             noise: noise.sqrt(),
             share: SHARES[self.share.min(SHARES.len() - 1)],
             structured,
@@ -461,56 +466,3 @@ impl Fit {
 }
 
 const FIRST_RESIDUAL: Stage = Stage::Residuals { bin: 0, last: 0.0, count: 0.0, squares: 0.0, differences: 0.0 };
-
-/// A symmetric positive definite system of four, factored.
-struct Cholesky([[f64; 4]; 4]);
-
-impl Cholesky {
-    /// Factors the matrix; `None` when it is singular.
-    fn new(matrix: [[f64; 4]; 4]) -> Option<Cholesky> {
-        const SINGULAR: f64 = 1e-10;
-        let mut l = [[0.0; 4]; 4];
-        for i in 0..4 {
-            for j in 0..=i {
-                let dot: f64 = (0..j).map(|m| l[i][m] * l[j][m]).sum();
-                let rest = matrix[i][j] - dot;
-                if i == j {
-                    if rest <= SINGULAR * matrix[i][i] {
-                        return None;
-                    }
-                    l[i][i] = rest.sqrt();
-                } else {
-                    l[i][j] = rest / l[j][j];
-                }
-            }
-        }
-        Some(Cholesky(l))
-    }
-
-    /// L⁻¹·right.
-    fn forward(&self, right: [f64; 4]) -> [f64; 4] {
-        let l = &self.0;
-        let mut y = right;
-        for i in 0..4 {
-            let dot: f64 = (0..i).map(|m| l[i][m] * y[m]).sum();
-            y[i] = (y[i] - dot) / l[i][i];
-        }
-        y
-    }
-
-    /// g·A⁻¹·g, the variance of a sum weighted with g, as |L⁻¹·g|².
-    fn inverse_form(&self, g: [f64; 4]) -> f64 {
-        self.forward(g).iter().map(|y| y * y).sum()
-    }
-
-    /// A⁻¹·right.
-    fn solve(&self, right: [f64; 4]) -> [f64; 4] {
-        let l = &self.0;
-        let mut y = self.forward(right);
-        for i in (0..4).rev() {
-            let dot: f64 = (i + 1..4).map(|m| l[m][i] * y[m]).sum();
-            y[i] = (y[i] - dot) / l[i][i];
-        }
-        y
-    }
-}

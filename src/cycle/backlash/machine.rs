@@ -306,7 +306,13 @@ impl Backlash {
             }
             return &self.output;
         }
-        let danger = if self.safe(input) || self.regardless() { None } else { self.danger(input) };
+        let first = self.phase == Phase::Begin;
+        if first {
+            // Also a run that ends in its first cycle leaves the axis where it is.
+            let here = if input.position_mm.is_finite() { input.position_mm } else { self.output.target_position_mm };
+            self.profile = Profile::at_rest(here, self.plan.acceleration);
+        }
+        let danger = if (self.safe(input) && !first) || self.regardless() { None } else { self.danger(input) };
         if let Some(fault) = danger {
             self.leave(fault);
         } else if self.left == 0 {
@@ -398,8 +404,7 @@ impl Backlash {
             return fault(GIB_ERR_TRAVEL_BOUND, "position_mm\0", position, plan.travel[0], plan.travel[1]);
         }
         let lag = self.profile.position - input.position_mm;
-        // Before the first command nothing can lag.
-        if self.phase == Phase::Begin || lag.abs() <= plan.lag_limit {
+        if lag.abs() <= plan.lag_limit {
             return None;
         }
         fault(GIB_ERR_LAG, "position_mm\0", lag, -plan.lag_limit, plan.lag_limit)

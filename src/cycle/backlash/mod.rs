@@ -13,9 +13,10 @@
 //! | [`io`] | what crosses the boundary in a cycle |
 //! | [`machine`] | the state machine called once per servo cycle |
 //! | [`curve`] | torque against travel |
-//! | [`fit`], [`peak`] | lost motion from a curve: ours and the published rule |
+//! | [`fit`] (its normal equations in `cholesky`), [`peak`] | lost motion from a curve: ours and the published rule |
 //! | [`verdict`] | means, uncertainty, and whether to trust them |
 
+mod cholesky;
 pub mod config;
 pub mod curve;
 pub mod fit;

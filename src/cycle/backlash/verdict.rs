@@ -6,8 +6,8 @@
 use super::fit::{Fitted, Levels};
 use super::plan::Plan;
 use crate::error::{
-    Fault, GIB_ERR_BACKLASH_DIRECTIONS, GIB_ERR_BACKLASH_LIMIT, GIB_ERR_BACKLASH_NOISE, GIB_ERR_BACKLASH_RESOLUTION,
-    GIB_ERR_BACKLASH_SHAPE, GIB_ERR_STATE, in_range,
+    Fault, GIB_ERR_BACKLASH_DIRECTIONS, GIB_ERR_BACKLASH_LIMIT, GIB_ERR_BACKLASH_MOTOR_FRICTION,
+    GIB_ERR_BACKLASH_NOISE, GIB_ERR_BACKLASH_RESOLUTION, GIB_ERR_BACKLASH_SHAPE, GIB_ERR_STATE, in_range,
 };
 
 /// Lost motion of one sense, or the mean of both. Lost motion is estimated from torque: it is not the reversal
@@ -278,6 +278,26 @@ pub fn check_reversal(fit: Option<&Fitted>) -> Result<Fitted, Fault> {
         });
     }
     Ok(*fit)
+}
+
+/// Says whether curve and probe found the same friction on the motor's side: across a clearance the motor has nothing else to
+/// overcome, but for the zero of the torque reading, which the middle of the sliding levels bounds.
+///
+/// # Errors
+/// `GIB_ERR_BACKLASH_MOTOR_FRICTION` with how far the two are apart.
+pub fn check_motor(fit: &Fitted, levels: &Levels) -> Result<(), Fault> {
+    /// Share of the wind-up from which a clearance shows a level of its own, and share of sliding that is the same.
+    const CLEAR: f64 = 0.25;
+    const SAME: f64 = 0.1;
+    let (apart, same) = ((fit.level - levels.motor).abs(), SAME * 0.5 * (levels.after - levels.before));
+    // The variance is that of twice the motor's friction, mostly.
+    let chance = (fit.level_error * fit.level_error + 0.25 * levels.variance).sqrt();
+    let allowed = same + (0.5 * (levels.after + levels.before).abs()).min(same) + DISAGREEMENT * chance;
+    if fit.clearance > CLEAR * fit.windup && apart > allowed {
+        let (code, field) = (GIB_ERR_BACKLASH_MOTOR_FRICTION, "torque\0");
+        return Err(Fault { code, field, value: apart, low: 0.0, high: allowed });
+    }
+    Ok(())
 }
 
 /// Says whether the whole result can be written.

@@ -58,7 +58,6 @@ impl Backlash {
     }
 
     fn begin(&mut self, input: &BacklashInput) {
-        self.profile = Profile::at_rest(input.position_mm, self.plan.acceleration);
         self.fallback_um = input.compensation_um;
         self.references = self.plan.references.unwrap_or([input.position_mm; 2]);
         if let Err(fault) = self.plan.check_reach(self.references) {
@@ -299,11 +298,13 @@ impl Backlash {
         let change = self.after.mean() - self.before.mean();
         let motor = (0.5 * twice).max(0.0);
         // More than half of the friction on the motor's side leaves too little wind-up to see; and a probe that
-        // cannot say is no probe.
+        // cannot say is no probe; nor is one whose torque is the same all the way, there and back: it is stuck.
         const LARGEST_SHARE: f64 = 0.55;
         const WORST_ERROR: f64 = 0.1;
-        let share = 2.0 * motor / change;
-        if !(share <= LARGEST_SHARE && twice_variance >= 0.0 && twice_variance.sqrt() <= WORST_ERROR * change) {
+        const STUCK: f64 = 1e-7;
+        let (share, error) = (2.0 * motor / change, twice_variance.sqrt());
+        let alive = twice.abs() > STUCK * change || error > STUCK * change;
+        if !(alive && share <= LARGEST_SHARE && error <= WORST_ERROR * change) {
             return self.leave(Fault {
                 code: GIB_ERR_BACKLASH_MOTOR_FRICTION,
                 field: "torque\0",
@@ -341,7 +342,8 @@ impl Backlash {
     #[cold]
     fn conclude(&mut self) {
         let index = self.index;
-        let fitted = match verdict::check_reversal(self.fit.result()) {
+        let found = verdict::check_reversal(self.fit.result());
+        let fitted = match found.and_then(|fitted| verdict::check_motor(&fitted, &self.levels).map(|()| fitted)) {
             Ok(fitted) => fitted,
             Err(fault) => return self.leave(fault),
         };

@@ -61,7 +61,19 @@ impl Watch {
         // helps the motion, the clearance reads higher by its share.
         let low = RISE_LOW + (-middle * per_half).clamp(0.0, MOST_LEAN);
         let high = low + RISE_HIGH;
-        Watch { middle, per_half, smooth: -1.0, gain, news: -1.0, margin, highest: -1.0, low, high, high_at: 0.0, end: limit }
+        Watch {
+            middle,
+            per_half,
+            smooth: -1.0,
+            gain,
+            news: -1.0,
+            margin,
+            highest: -1.0,
+            low,
+            high,
+            high_at: 0.0,
+            end: limit,
+        }
     }
 
     /// The smoothed torque once this sample is in.
