@@ -125,6 +125,37 @@ static void a_load_hides_no_clearance(void **state)
     }
 }
 
+/* An axis that hangs on its drive never crosses the clearance: what it loses is the wind-up. In between one sense does not suffice. */
+static void a_vertical_axis_is_measured(void **state)
+{
+    (void)state;
+    static const struct {
+        double load_nm;
+        int one_direction;
+        int32_t ends;
+    } CASES[] = {{-4.0, 0, GIB_DONE}, {4.0, 0, GIB_DONE}, {-6.0, 1, GIB_DONE}, {6.0, 1, GIB_DONE}, {-1.6, 1, GIB_ERR_BACKLASH_SHAPE}, {1.6, 1, GIB_ERR_BACKLASH_SHAPE}};
+    for (size_t i = 0; i < sizeof CASES / sizeof *CASES; i++) {
+        bench *b = bench_new();
+        plant_config axis = plant_default();
+        axis.constant_nm = CASES[i].load_nm;
+        plant_init(&b->axis, &axis);
+        b->axis.compensation_um = 7.0;
+        gib_backlash_config c = quick_config();
+        c.one_direction = CASES[i].one_direction;
+        assert_int_equal(gib_backlash_start(b->gib, &c), GIB_OK);
+        int32_t ends = run(b);
+        assert_int_equal(ends, CASES[i].ends);
+        gib_backlash_report r = report_of(b);
+        if (ends == GIB_DONE) {
+            assert_true(fabs(r.mean.lost_motion_um - plant_true_lost_motion_um(&axis)) <= 1.5 * r.mean.uncertainty_um);
+            assert_true(r.mean.uncertainty_um < 2.0 && r.mean.clearance_um < 1.0);
+        } else {
+            assert_true(b->axis.compensation_um == 7.0);
+        }
+        bench_free(b);
+    }
+}
+
 static void curve_is_readable(void **state)
 {
     (void)state;
@@ -374,6 +405,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(measures_and_writes),
         cmocka_unit_test(a_load_hides_no_clearance),
+        cmocka_unit_test(a_vertical_axis_is_measured),
         cmocka_unit_test(curve_is_readable),
         cmocka_unit_test(measure_only_writes_nothing),
         cmocka_unit_test(one_direction_and_peak),

@@ -1458,7 +1458,8 @@ typedef struct gib_backlash_config {
      */
     int32_t first_direction;
     /**
-     * 0: measure the reversals of both senses (default). 1: only the first.
+     * 0: measure the reversals of both senses (default). 1: only the first; refused under a constant load of half to all of
+     * what the table's friction holds, where only the other sense tells whether the table creeps through a clearance.
      */
     int32_t one_direction;
     /**

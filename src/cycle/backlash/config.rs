@@ -29,7 +29,8 @@ pub struct BacklashConfig {
     pub method: i32,
     /// Sense of the motion before the first reversal: +1 (default) or -1.
     pub first_direction: i32,
-    /// 0: measure the reversals of both senses (default). 1: only the first.
+    /// 0: measure the reversals of both senses (default). 1: only the first; refused under a constant load of half to all of
+    /// what the table's friction holds, where only the other sense tells whether the table creeps through a clearance.
     pub one_direction: i32,
     /// Reversals measured in each sense, 1 to 20 (default 3).
     pub repeats: i32,

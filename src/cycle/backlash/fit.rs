@@ -213,8 +213,11 @@ impl Fit {
         const SLIDING: f64 = 0.85; // from there on a reading may fall again: the table sticks and slips
         let to = (from + SLICE).min(curve.used());
         // The rise starts at the motor's friction, and at more where the middle of the levels is a torque sensor's zero
-        // and not a load; it ends at sliding.
-        let from_level = self.levels.motor + (0.5 * (self.levels.before + self.levels.after)).max(0.0);
+        // and not a load; it ends at sliding. A load that the table's friction does not hold never lets the spring go slack:
+        // there is no clearance in the curve, and half of the change is the rise.
+        let middle = 0.5 * (self.levels.before + self.levels.after);
+        let hangs = -middle > 0.5 * self.levels.spring_change();
+        let from_level = self.levels.motor + if hangs { middle } else { middle.max(0.0) };
         let rise = self.levels.after - from_level;
         for bin in from..to {
             let mut sums = *self.running(bin);

@@ -300,6 +300,22 @@ pub fn check_motor(fit: &Fitted, levels: &Levels) -> Result<(), Fault> {
     Ok(())
 }
 
+/// Says whether one direction alone can be trusted: under a load of half to all of what the table's friction holds, the table may
+/// creep through the clearance while the motor turns, in one sense only. Both directions then disagree.
+///
+/// # Errors
+/// `GIB_ERR_BACKLASH_SHAPE` with the load as a share of that friction.
+pub fn check_load(plan: &Plan, levels: &Levels) -> Result<(), Fault> {
+    const HELD: f64 = 0.5;
+    const FALLS: f64 = 1.1;
+    let load = (levels.after + levels.before).abs() / levels.spring_change();
+    if plan.senses == 1 && load > HELD && load < FALLS {
+        let (code, field) = (GIB_ERR_BACKLASH_SHAPE, "one_direction\0");
+        return Err(Fault { code, field, value: load, low: 0.0, high: HELD });
+    }
+    Ok(())
+}
+
 /// Says whether the whole result can be written.
 ///
 /// # Errors

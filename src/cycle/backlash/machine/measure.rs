@@ -342,8 +342,11 @@ impl Backlash {
     #[cold]
     fn conclude(&mut self) {
         let index = self.index;
-        let found = verdict::check_reversal(self.fit.result());
-        let fitted = match found.and_then(|fitted| verdict::check_motor(&fitted, &self.levels).map(|()| fitted)) {
+        let sound = verdict::check_reversal(self.fit.result()).and_then(|fitted| {
+            verdict::check_motor(&fitted, &self.levels)?;
+            verdict::check_load(&self.plan, &self.levels).map(|()| fitted)
+        });
+        let fitted = match sound {
             Ok(fitted) => fitted,
             Err(fault) => return self.leave(fault),
         };

@@ -58,8 +58,9 @@ impl Watch {
         let margin = LEAST_NEWS + 2.0 * noise * per_half * (0.5 * gain).sqrt();
         let middle = 0.5 * (before + after);
         // Across a clearance the motor has its own friction to overcome, and no load that leans on the table: where that
-        // helps the motion, the clearance reads higher by its share.
-        let low = RISE_LOW + (-middle * per_half).clamp(0.0, MOST_LEAN);
+        // helps the motion, the clearance reads higher by its share. One that no friction holds leaves no clearance to cross.
+        let lean = -middle * per_half;
+        let low = RISE_LOW + if lean > 1.0 { 0.0 } else { lean.clamp(0.0, MOST_LEAN) };
         let high = low + RISE_HIGH;
         Watch {
             middle,
