@@ -64,7 +64,10 @@ static void draw(backlash_adversary *a)
     c->breakaway_ratio = between(a, 1.0, 1.3);
     c->hold_ratio = between(a, 0.5, 1.0);
     c->viscous_nm_s_mm = chance(a, 0.5) ? 0.0 : scale * over(a, 0.001, 0.05);
-    c->constant_nm = chance(a, 0.3) ? between(a, -0.3, 0.3) * c->friction_nm : 0.0;
+    /* A load that the table's friction holds well, or one on which it hangs. */
+    int hangs = chance(a, 0.15);
+    double load = hangs ? (chance(a, 0.5) ? -1.0 : 1.0) * between(a, 1.2, 2.0) : chance(a, 0.3) ? between(a, -0.3, 0.3) : 0.0;
+    c->constant_nm = load * c->friction_nm;
     c->torque_noise_nm = chance(a, 0.1) ? 0.0 : over(a, 0.002, 0.06) * c->friction_nm;
     c->encoder_mm = over(a, 0.00005, 0.001);
     c->torque_limit_nm = scale * 16.0;
@@ -81,9 +84,9 @@ static void draw(backlash_adversary *a)
     g->feed_mm_s = between(a, 0.2, 0.6);
     g->settle_s = between(a, 0.05, 0.2);
     g->slide_speed_mm_s = over(a, 0.5, 2.0);
-    /* What the table takes to slide as fast as gib reads it. */
+    /* What the table takes to slide as fast as gib reads it. One that hangs never crosses the clearance. */
     double takes_nm = (1.0 - c->motor_share) * c->friction_nm + c->viscous_nm_s_mm * g->slide_speed_mm_s;
-    a->truth_um = 1e3 * (c->clearance_mm + 2.0 * takes_nm / c->stiffness_nm_mm);
+    a->truth_um = 1e3 * ((hangs ? 0.0 : c->clearance_mm) + 2.0 * takes_nm / c->stiffness_nm_mm);
     g->step_um = fmax(1.0, 0.02 * a->truth_um);
     g->detection_limit_um = between(a, 2.0, 4.0) * fmax(a->truth_um, 15.0);
     g->approach_speed_mm_s = over(a, 2.0, 20.0);
@@ -191,6 +194,7 @@ static void serve(backlash_adversary *a)
     }
     if (begins(a, BACKLASH_AMOUNT_FOREIGN)) {
         a->axis.compensation_um = a->foreign_um = floor(40.0 * now(a, BACKLASH_AMOUNT_FOREIGN)->size);
+        a->old_um = a->cycle == 1 ? a->foreign_um : a->old_um;
     }
     if (a->asked_id == a->done_id || a->cycle - a->asked_at < waits || now(a, BACKLASH_DEAF)) {
         return;
@@ -289,7 +293,9 @@ static void see_answer(backlash_adversary *a, int was_busy)
     law(a, !(was_busy && wrong) || o->message < 0, "a fault in its cycle");
     law(a, !(was_busy && (in->flags & GIB_INPUT_FAULT) && !a->named) || o->target_speed_mm_s == 0.0, "a drive that trips is commanded nothing");
     int owed = o->message == GIB_ERR_RESTORE_UNCONFIRMED && o->status < 0;
-    law(a, a->named == 0 || o->message == a->before.message || owed || o->message == o->status, "the first fault kept");
+    /* Once it has ended, what an operator wished for begins. */
+    int wished = ever(a, BACKLASH_SWITCHED_OFF);
+    law(a, a->named == 0 || o->message == a->before.message || owed || wished || o->message == o->status, "the first fault kept");
     a->named = a->named == 0 && o->message < 0 ? a->cycle : a->named;
 }
 
