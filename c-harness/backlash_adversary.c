@@ -15,17 +15,17 @@ const char *const backlash_trouble_names[BACKLASH_TROUBLES] = {
 
 static double between(backlash_adversary *a, double low, double high)
 {
-    return low + (high - low) * plant_uniform(&a->random);
+    return random_between(&a->random, low, high);
 }
 
 static double over(backlash_adversary *a, double low, double high)
 {
-    return low * pow(high / low, plant_uniform(&a->random));
+    return random_over(&a->random, low, high);
 }
 
 static int chance(backlash_adversary *a, double share)
 {
-    return plant_uniform(&a->random) < share;
+    return random_chance(&a->random, share);
 }
 
 /* Cycles that a run may take at most: all ways at their speeds, twice, and the answers of the kernel. */
@@ -117,14 +117,8 @@ void backlash_adversary_init(backlash_adversary *a, uint64_t seed, backlash_mist
     a->random = seed;
     a->mistake = mistake;
     draw(a);
-    a->troubles = chance(a, 0.25) ? 0 : (int)between(a, 1.0, BACKLASH_MOST_TROUBLES + 1.0);
-    for (int i = 0; i < a->troubles; i++) {
-        backlash_trouble *t = &a->trouble[i];
-        t->kind = (int)between(a, 0.0, BACKLASH_TROUBLES);
-        t->at = 1 + (int)(chance(a, 0.1) ? 0.0 : between(a, 0.0, 0.3 * a->longest));
-        t->lasts = chance(a, 0.4) ? 1 << 30 : (int)over(a, 1.0, 0.3 * a->longest);
-        t->size = between(a, 0.0, 1.0);
-    }
+    int count = chance(a, 0.25) ? 0 : (int)between(a, 1.0, BACKLASH_MOST_TROUBLES + 1.0);
+    troubles_draw(&a->troubles, &a->random, count, BACKLASH_TROUBLES, 0.3 * a->longest, 0.1, 0.4);
 }
 
 static void law(backlash_adversary *a, int holds, const char *what)
@@ -140,40 +134,25 @@ static gib_backlash *gib_of(backlash_adversary *a, int which)
     return (gib_backlash *)a->memory[which];
 }
 
-static const backlash_trouble *now(const backlash_adversary *a, int kind)
+static const trouble *now(const backlash_adversary *a, int kind)
 {
-    for (int i = 0; a->run == 0 && !a->ended && i < a->troubles; i++) {
-        const backlash_trouble *t = &a->trouble[i];
-        if (t->kind == kind && t->begun && a->cycle - t->at < t->lasts) {
-            return t;
-        }
-    }
-    return NULL;
+    return a->run == 0 && !a->ended ? troubles_now(&a->troubles, kind, a->cycle) : NULL;
 }
 
 static int begins(const backlash_adversary *a, int kind)
 {
-    const backlash_trouble *t = now(a, kind);
+    const trouble *t = now(a, kind);
     return t && t->at == a->cycle;
 }
 
 static int ever(const backlash_adversary *a, int kind)
 {
-    for (int i = 0; a->run == 0 && i < a->troubles; i++) {
-        if (a->trouble[i].kind == kind && a->trouble[i].begun) {
-            return 1;
-        }
-    }
-    return 0;
+    return a->run == 0 && troubles_ever(&a->troubles, kind);
 }
 
 int backlash_adversary_clean(const backlash_adversary *a, int run)
 {
-    int begun = 0;
-    for (int i = 0; run == 0 && i < a->troubles; i++) {
-        begun |= a->trouble[i].begun;
-    }
-    return !begun;
+    return run != 0 || troubles_met(&a->troubles) == 0;
 }
 
 /* What one unit of the torque that the drive reports is, N·m. */
@@ -186,7 +165,7 @@ static double unit_nm(const backlash_adversary *a)
 static void serve(backlash_adversary *a)
 {
     const gib_backlash_output *o = &a->out;
-    const backlash_trouble *t = now(a, BACKLASH_LATE);
+    const trouble *t = now(a, BACKLASH_LATE);
     double waits = a->answer_cycles + (t ? t->size / a->config.cycle_s : 0.0), grid = a->config.compensation_resolution_um;
     if (o->request_id != a->asked_id) {
         a->asked_id = o->request_id;
@@ -209,7 +188,7 @@ static void serve(backlash_adversary *a)
 /* The axis moves for a cycle toward what gib commands, or stays. */
 static void drive(backlash_adversary *a)
 {
-    const backlash_trouble *t;
+    const trouble *t;
     a->command_mm = a->out.owns_motion ? a->out.target_position_mm : a->command_mm;
     memmove(a->late_mm + 1, a->late_mm, sizeof a->late_mm - sizeof *a->late_mm);
     a->late_mm[0] = a->command_mm;
@@ -229,7 +208,7 @@ static void drive(backlash_adversary *a)
 static void tell(backlash_adversary *a)
 {
     static const double NONE[] = {NAN, INFINITY, -INFINITY}, HUGE_ONES[] = {1e4, -1e9, 1e15, -1e30, DBL_MAX, -DBL_MAX};
-    const backlash_trouble *t;
+    const trouble *t;
     const double unit = unit_nm(a), delivered = a->past[0].torque_nm;
     gib_backlash_input *in = &a->told;
     memset(in, 0, sizeof *in);
@@ -320,10 +299,10 @@ static int32_t cycle(backlash_adversary *a)
     gib_backlash_output twin;
     int was_busy = a->before.status == GIB_BUSY;
     a->cycle++;
-    for (int i = 0; a->run == 0 && i < a->troubles; i++) {
-        a->trouble[i].begun |= !a->ended && a->trouble[i].at == a->cycle;
+    if (a->run == 0 && !a->ended) {
+        troubles_begin(&a->troubles, a->cycle);
     }
-    const backlash_trouble *lost = now(a, BACKLASH_CYCLES_LOST);
+    const trouble *lost = now(a, BACKLASH_CYCLES_LOST);
     do {
         drive(a);
         serve(a);

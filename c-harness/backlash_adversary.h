@@ -8,6 +8,7 @@
 
 #include "gib.h"
 #include "plant.h"
+#include "troubles.h"
 
 typedef enum {
     BACKLASH_TORQUE_STUCK,
@@ -60,19 +61,13 @@ typedef enum {
     BACKLASH_MISTAKES
 } backlash_mistake;
 
-typedef struct {
-    int kind, at, lasts; /* cycles */
-    double size;         /* 0 to 1 */
-    int begun;
-} backlash_trouble;
-
 enum { BACKLASH_MOST_TROUBLES = 3, BACKLASH_MEMORY = 131072, BACKLASH_LATEST = 16 };
 
 typedef struct {
     plant_config c;
     gib_backlash_config config;
-    backlash_trouble trouble[BACKLASH_MOST_TROUBLES];
-    int troubles, answer_cycles;
+    troubles troubles;
+    int answer_cycles;
     double truth_um, old_um, longest; /* lost motion; amount at the start; cycles that a run may take */
     backlash_mistake mistake;
     uint64_t random;

@@ -21,4 +21,9 @@ typedef struct {
  * the fresh runs, on these. Returns what main returns. */
 int fresh_runs_main(int argc, char **argv, fresh_runs *fresh, const struct CMUnitTest *tests, size_t count);
 
+/* Laws that can fail: each mistake from 1 on, put in on purpose, must break its law in `least` or more of so many runs from that seed on.
+ * `broken_by` makes one run with a mistake and returns the first law that it broke, or NULL. */
+void fresh_runs_mistakes(const char *(*broken_by)(int mistake, uint64_t seed), const char *const laws[], int mistakes, uint64_t seed,
+                         int runs, int least);
+
 #endif

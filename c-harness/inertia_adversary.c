@@ -19,7 +19,7 @@ static double between(inertia_adversary *a, double low, double high)
 
 static int chance(inertia_adversary *a, double share)
 {
-    return between(a, 0.0, 1.0) < share;
+    return random_chance(&a->random, share);
 }
 
 static double expected_s(const gib_inertia_config *g)
@@ -98,15 +98,9 @@ void inertia_adversary_init(inertia_adversary *a, uint64_t seed, inertia_mistake
     a->random = seed;
     a->mistake = mistake;
     draw(a);
-    a->troubles = chance(a, 0.3) ? 0 : (int)between(a, 1.0, INERTIA_MOST_TROUBLES + 1.0);
     double cycles = expected_s(&a->config[0]) / a->config[0].cycle_s;
-    for (int i = 0; i < a->troubles; i++) {
-        inertia_trouble *t = &a->trouble[i];
-        t->kind = (int)between(a, 0.0, INERTIA_TROUBLES);
-        t->at = 1 + (int)(chance(a, 0.2) ? 0.0 : between(a, 0.0, cycles));
-        t->lasts = chance(a, 0.4) ? 1 << 30 : (int)random_over(&a->random, 1.0, cycles);
-        t->size = between(a, 0.0, 1.0);
-    }
+    int count = chance(a, 0.3) ? 0 : (int)between(a, 1.0, INERTIA_MOST_TROUBLES + 1.0);
+    troubles_draw(&a->troubles, &a->random, count, INERTIA_TROUBLES, cycles, 0.2, 0.4);
     /* Metal is cut off before the next process step. */
     a->plant[1] = a->plant[0];
     a->config[1] = a->config[0];
@@ -128,20 +122,14 @@ static gib_inertia *gib_of(inertia_adversary *a, int which)
     return (gib_inertia *)a->memory[which];
 }
 
-static const inertia_trouble *now(const inertia_adversary *a, int kind)
+static const trouble *now(const inertia_adversary *a, int kind)
 {
-    for (int i = 0; a->run == 0 && i < a->troubles; i++) {
-        const inertia_trouble *t = &a->trouble[i];
-        if (t->kind == kind && t->begun && a->cycle - t->at < t->lasts) {
-            return t;
-        }
-    }
-    return NULL;
+    return a->run == 0 ? troubles_now(&a->troubles, kind, a->cycle) : NULL;
 }
 
 static int begins(const inertia_adversary *a, int kind)
 {
-    const inertia_trouble *t = now(a, kind);
+    const trouble *t = now(a, kind);
     return t && t->at == a->cycle;
 }
 
@@ -151,7 +139,7 @@ static void tell(inertia_adversary *a)
     const spindle_config *c = &a->plant[a->run];
     const gib_inertia_config *g = &a->config[a->run];
     static const double HUGE_ONES[] = {1e6, -1e9, 1e13, -1e30, DBL_MAX, -DBL_MAX};
-    const inertia_trouble *t;
+    const trouble *t;
     gib_inertia_input *in = &a->told;
     double delivered = a->s.past[c->torque_late_cycles];
     spindle_reading r = spindle_sense(&a->s);
@@ -206,7 +194,7 @@ static double listened_rpm(const inertia_adversary *a)
 static void drive(inertia_adversary *a)
 {
     const spindle_config *c = &a->plant[a->run];
-    const inertia_trouble *t;
+    const trouble *t;
     int listens = a->config[a->run].mode == GIB_INERTIA_LISTEN;
     a->command_rpm = a->out.owns_motion ? a->out.speed_command_rpm : listens ? listened_rpm(a) : a->start_rpm;
     a->refused_rpm = begins(a, INERTIA_DRIVE_REFUSES) ? a->command_rpm : a->refused_rpm;
@@ -293,8 +281,8 @@ static int32_t cycle(inertia_adversary *a)
     gib_inertia_output twin;
     int was_busy = a->before.status == GIB_BUSY;
     a->cycle++;
-    for (int i = 0; a->run == 0 && i < a->troubles; i++) {
-        a->trouble[i].begun |= !a->ended && a->trouble[i].at == a->cycle;
+    if (a->run == 0 && !a->ended) {
+        troubles_begin(&a->troubles, a->cycle);
     }
     tell(a);
     a->first_rpm = a->cycle == 1 ? a->told.speed_rpm : a->first_rpm;
@@ -358,22 +346,14 @@ static void see_result(inertia_adversary *a)
 
 static int ever(const inertia_adversary *a, int kind)
 {
-    for (int i = 0; i < a->troubles; i++) {
-        if (a->trouble[i].kind == kind && a->trouble[i].begun) {
-            return 1;
-        }
-    }
-    return 0;
+    return troubles_ever(&a->troubles, kind);
 }
 
 int inertia_adversary_clean(const inertia_adversary *a, int run)
 {
     const spindle_config *c = &a->plant[run];
     const gib_inertia_config *g = &a->config[run];
-    int begun = 0;
-    for (int i = 0; run == 0 && i < a->troubles; i++) {
-        begun |= a->trouble[i].begun;
-    }
+    int begun = run == 0 && troubles_met(&a->troubles) > 0;
     int untold = (c->weakening_rpm > 0.0 && g->base_speed_rpm == 0.0) || (c->saturation_nm > 0.0 && g->saturation_nm == 0.0);
     return !begun && !untold;
 }

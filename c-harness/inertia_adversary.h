@@ -7,6 +7,7 @@
 #define INERTIA_ADVERSARY_H
 
 #include "spindle_run.h"
+#include "troubles.h"
 
 typedef enum {
     INERTIA_TORQUE_STUCK,
@@ -56,19 +57,12 @@ typedef enum {
     INERTIA_MISTAKES
 } inertia_mistake;
 
-typedef struct {
-    int kind, at, lasts; /* cycles */
-    double size;
-    int begun;
-} inertia_trouble;
-
 enum { INERTIA_MOST_TROUBLES = 3, INERTIA_MEMORY = 32768, INERTIA_LATEST = 16 };
 
 typedef struct {
     spindle_config plant[2]; /* of the first process step and the next */
     gib_inertia_config config[2];
-    inertia_trouble trouble[INERTIA_MOST_TROUBLES];
-    int troubles;
+    troubles troubles;
     double start_rpm;
     inertia_mistake mistake;
     uint64_t random;

@@ -5,19 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-double random_between(uint64_t *state, double low, double high)
-{
-    uint64_t z = (*state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return low + (high - low) * (double)((z ^ (z >> 31)) >> 11) / 9007199254740992.0;
-}
-
-double random_over(uint64_t *state, double low, double high)
-{
-    return exp(random_between(state, log(low), log(high)));
-}
-
 spindle_config spindle_random(uint64_t *state)
 {
     spindle_config c = spindle_default();

@@ -5,12 +5,9 @@
 #ifndef SPINDLE_RUN_H
 #define SPINDLE_RUN_H
 
+#include "draws.h"
 #include "gib.h"
 #include "spindle_plant.h"
-
-/* The next random number between two bounds, and one whose logarithm is even between theirs. */
-double random_between(uint64_t *state, double low, double high);
-double random_over(uint64_t *state, double low, double high);
 
 /* A spindle of 0.01 to 5 kg.m2 with friction up to half of its rated torque, ripple and 3 % noise; rated at half its limit. */
 spindle_config spindle_random(uint64_t *state);

@@ -24,10 +24,7 @@ static void describe(uint64_t seed)
     print_message("seed %llu: %s, run %d, cycle %d (named in %d), cycle %g ms, mode %d: %s; found %.2f um +- %.2f of %.2f\n", (unsigned long long)seed,
                   a.broken, a.run + 1, a.broken_at, a.named, 1e3 * a.config.cycle_s, (int)a.config.mode, gib_status_text(a.status[a.run]),
                   r->mean.lost_motion_um, r->mean.uncertainty_um, a.truth_um);
-    for (int i = 0; i < a.troubles; i++) {
-        const backlash_trouble *t = &a.trouble[i];
-        print_message("    %s %.2f in cycle %d for %d%s\n", backlash_trouble_names[t->kind], t->size, t->at, t->lasts, t->begun ? "" : ": not met");
-    }
+    troubles_print(&a.troubles, backlash_trouble_names);
 }
 
 /* What came of all runs together. */
@@ -43,9 +40,7 @@ static tally count(uint64_t seed, int runs)
     for (int i = 0; i < runs; i++) {
         backlash_adversary_init(&a, seed + (uint64_t)i, BACKLASH_NO_MISTAKE);
         backlash_adversary_run(&a);
-        for (int k = 0; k < a.troubles; k++) {
-            t.met += a.trouble[k].begun;
-        }
+        t.met += troubles_met(&a.troubles);
         for (int run = 0; run <= a.run; run++) {
             int clean = backlash_adversary_clean(&a, run), value = a.status[run] == GIB_DONE;
             const gib_backlash_estimate *found = &a.report[run].mean;
@@ -90,6 +85,13 @@ static void every_law_holds_in_fresh_runs(void **state)
     assert_true(every_law_holds(&t, fresh.runs));
 }
 
+static const char *broken_by(int mistake, uint64_t seed)
+{
+    backlash_adversary_init(&a, seed, (backlash_mistake)mistake);
+    backlash_adversary_run(&a);
+    return a.broken;
+}
+
 /* The laws can fail: each of these mistakes, put in on purpose, breaks the one that is about it. */
 static void mistakes_break_laws(void **state)
 {
@@ -104,17 +106,7 @@ static void mistakes_break_laws(void **state)
         [BACKLASH_FORGETS] = "an end that lets go",
         [BACKLASH_REMEMBERS] = "nothing left behind",
     };
-    for (int m = BACKLASH_NO_MISTAKE + 1; m < BACKLASH_MISTAKES; m++) {
-        int broken = 0, met = 0;
-        for (int i = 0; i < MISTAKEN; i++) {
-            backlash_adversary_init(&a, KNOWN_SEED + (uint64_t)i, (backlash_mistake)m);
-            backlash_adversary_run(&a);
-            broken += a.broken != NULL;
-            met += a.broken && strcmp(a.broken, LAWS[m]) == 0;
-        }
-        print_message("%s: %d of %d runs of a mistake broke it, %d broke any\n", LAWS[m], met, MISTAKEN, broken);
-        assert_true(met >= 3);
-    }
+    fresh_runs_mistakes(broken_by, LAWS, BACKLASH_MISTAKES, KNOWN_SEED, MISTAKEN, 3);
 }
 
 int main(int argc, char **argv)

@@ -23,10 +23,7 @@ static void describe(uint64_t seed)
                   (unsigned long long)seed, a.broken, a.run + 1, a.broken_at, a.ended, a.named, 1e3 * a.config[0].cycle_s, (int)a.status[a.run],
                   (int)a.result[a.run], a.detail[a.run].field ? a.detail[a.run].field : "", a.detail[a.run].value, 100.0 * a.error[a.run],
                   100.0 * a.report[a.run].total_uncertainty_kg_m2 / a.plant[a.run].inertia_kg_m2);
-    for (int i = 0; i < a.troubles; i++) {
-        const inertia_trouble *t = &a.trouble[i];
-        print_message("    %s in cycle %d for %d%s\n", inertia_trouble_names[t->kind], t->at, t->lasts, t->begun ? "" : ": not met");
-    }
+    troubles_print(&a.troubles, inertia_trouble_names);
 }
 
 static const char RIGHT[] = "a value that is right, or refused";
@@ -42,9 +39,7 @@ static tally count(uint64_t seed, int runs)
     for (int i = 0; i < runs; i++) {
         inertia_adversary_init(&a, seed + (uint64_t)i, INERTIA_NO_MISTAKE);
         inertia_adversary_run(&a);
-        for (int k = 0; k < a.troubles; k++) {
-            t.met += a.trouble[k].begun;
-        }
+        t.met += troubles_met(&a.troubles);
         for (int run = 0; run <= a.run; run++) {
             int clean = inertia_adversary_clean(&a, run) && a.status[run] == GIB_DONE, value = a.result[run] == GIB_OK;
             t.done += a.status[run] == GIB_DONE;
@@ -91,6 +86,13 @@ static void every_law_holds_in_fresh_runs(void **state)
     assert_true(every_law_holds(&t, fresh.runs));
 }
 
+static const char *broken_by(int mistake, uint64_t seed)
+{
+    inertia_adversary_init(&a, seed, (inertia_mistake)mistake);
+    inertia_adversary_run(&a);
+    return a.broken;
+}
+
 /* The laws can fail: each of these mistakes, put in on purpose, breaks the one that is about it. */
 static void mistakes_break_laws(void **state)
 {
@@ -104,17 +106,7 @@ static void mistakes_break_laws(void **state)
         [INERTIA_OFF] = RIGHT,
         [INERTIA_REMEMBERS] = "the same inputs, the same outputs",
     };
-    for (int m = INERTIA_NO_MISTAKE + 1; m < INERTIA_MISTAKES; m++) {
-        int broken = 0, met = 0;
-        for (int i = 0; i < 30; i++) {
-            inertia_adversary_init(&a, KNOWN_SEED + (uint64_t)i, (inertia_mistake)m);
-            inertia_adversary_run(&a);
-            broken += a.broken != NULL;
-            met += a.broken && strcmp(a.broken, LAWS[m]) == 0;
-        }
-        print_message("%s: %d of 30 runs of a mistake broke it, %d broke any\n", LAWS[m], met, broken);
-        assert_true(met >= 3);
-    }
+    fresh_runs_mistakes(broken_by, LAWS, INERTIA_MISTAKES, KNOWN_SEED, 30, 3);
 }
 
 int main(int argc, char **argv)

@@ -6,7 +6,6 @@
 #include "fresh_runs.h"
 #include "variation_adversary.h"
 
-#include <string.h>
 
 enum { KNOWN_SEED = 20260400, KNOWN_RUNS = 2000, FRESH_RUNS = 20 };
 
@@ -17,10 +16,7 @@ static void describe(uint64_t seed)
 {
     print_message("seed %llu: %s, run %d, cycle %d (ended from %d), cycle %g ms: %s\n", (unsigned long long)seed, a.broken, a.run + 1,
                   a.broken_at, a.named, 1e3 * a.config.cycle_s, gib_status_text(a.out.status));
-    for (int i = 0; i < a.troubles; i++) {
-        const variation_trouble *t = &a.trouble[i];
-        print_message("    %s in cycle %d for %d%s\n", variation_trouble_names[t->kind], t->at, t->lasts, t->begun ? "" : ": not met");
-    }
+    troubles_print(&a.troubles, variation_trouble_names);
 }
 
 static void every_law_holds(uint64_t seed, int runs)
@@ -30,9 +26,7 @@ static void every_law_holds(uint64_t seed, int runs)
     for (int i = 0; i < runs; i++) {
         variation_adversary_init(&a, seed + (uint64_t)i, VARIATION_NO_MISTAKE);
         variation_adversary_run(&a);
-        for (int k = 0; k < a.troubles; k++) {
-            met += a.trouble[k].begun;
-        }
+        met += troubles_met(&a.troubles);
         well += a.status[0] == GIB_DONE;
         worst = a.worst > worst ? a.worst : worst;
         broken += a.broken != NULL;
@@ -58,6 +52,13 @@ static void every_law_holds_in_fresh_runs(void **state)
     every_law_holds(fresh.seed, fresh.runs);
 }
 
+static const char *broken_by(int mistake, uint64_t seed)
+{
+    variation_adversary_init(&a, seed, (variation_mistake)mistake);
+    variation_adversary_run(&a);
+    return a.broken;
+}
+
 /* The laws can fail: each of these mistakes, put in on purpose, breaks the one that is about it. */
 static void mistakes_break_laws(void **state)
 {
@@ -73,17 +74,7 @@ static void mistakes_break_laws(void **state)
         [VARIATION_TIMID] = "a swing as asked for",
         [VARIATION_REMEMBERS] = "the same inputs, the same outputs",
     };
-    for (int m = VARIATION_NO_MISTAKE + 1; m < VARIATION_MISTAKES; m++) {
-        int broken = 0, met = 0;
-        for (int i = 0; i < 100; i++) {
-            variation_adversary_init(&a, KNOWN_SEED + (uint64_t)i, (variation_mistake)m);
-            variation_adversary_run(&a);
-            broken += a.broken != NULL;
-            met += a.broken && strcmp(a.broken, LAWS[m]) == 0;
-        }
-        print_message("%s: %d of 100 runs of a mistake broke it, %d broke any\n", LAWS[m], met, broken);
-        assert_true(met >= 5);
-    }
+    fresh_runs_mistakes(broken_by, LAWS, VARIATION_MISTAKES, KNOWN_SEED, 100, 5);
 }
 
 int main(int argc, char **argv)

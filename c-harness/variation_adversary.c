@@ -19,7 +19,7 @@ static double between(variation_adversary *a, double low, double high)
 
 static int chance(variation_adversary *a, double share)
 {
-    return between(a, 0.0, 1.0) < share;
+    return random_chance(&a->random, share);
 }
 
 static double given(double value, double otherwise)
@@ -61,14 +61,8 @@ void variation_adversary_init(variation_adversary *a, uint64_t seed, variation_m
     a->mistake = mistake;
     draw(a);
     a->cycles = (int)fmin(fmax(between(a, 1.0, 4.0) * a->config.period_s / a->config.cycle_s, 300.0), 4000.0);
-    a->troubles = (int)between(a, 1.0, VARIATION_MOST_TROUBLES + 1.0);
-    for (int i = 0; i < a->troubles; i++) {
-        variation_trouble *t = &a->trouble[i];
-        t->kind = (int)between(a, 0.0, VARIATION_TROUBLES);
-        t->at = 1 + (int)(chance(a, 0.1) ? 0.0 : between(a, 0.0, a->cycles));
-        t->lasts = chance(a, 0.5) ? 1 << 30 : (int)random_over(&a->random, 1.0, a->cycles);
-        t->size = between(a, 0.0, 1.0);
-    }
+    int count = (int)between(a, 1.0, VARIATION_MOST_TROUBLES + 1.0);
+    troubles_draw(&a->troubles, &a->random, count, VARIATION_TROUBLES, a->cycles, 0.1, 0.5);
 }
 
 static void law(variation_adversary *a, int holds, const char *what)
@@ -84,31 +78,20 @@ static gib_speed_variation *gib_of(variation_adversary *a, int which)
     return (gib_speed_variation *)a->memory[which];
 }
 
-static const variation_trouble *now(const variation_adversary *a, int kind)
+static const trouble *now(const variation_adversary *a, int kind)
 {
-    for (int i = 0; a->run == 0 && i < a->troubles; i++) {
-        const variation_trouble *t = &a->trouble[i];
-        if (t->kind == kind && t->begun && a->cycle - t->at < t->lasts) {
-            return t;
-        }
-    }
-    return NULL;
+    return a->run == 0 ? troubles_now(&a->troubles, kind, a->cycle) : NULL;
 }
 
 static int begins(const variation_adversary *a, int kind)
 {
-    const variation_trouble *t = now(a, kind);
+    const trouble *t = now(a, kind);
     return t && t->at == a->cycle;
 }
 
 static int ever(const variation_adversary *a, int kind)
 {
-    for (int i = 0; i < a->troubles; i++) {
-        if (a->trouble[i].kind == kind && a->trouble[i].begun) {
-            return 1;
-        }
-    }
-    return 0;
+    return troubles_ever(&a->troubles, kind);
 }
 
 /* Asks for anything that may be asked for. */
@@ -128,7 +111,7 @@ static void ask(variation_adversary *a)
 {
     static const double ODD[] = {NAN, INFINITY, -INFINITY}, WILD[] = {1e7, -1e7, DBL_MAX, -DBL_MAX, -1e-300};
     const gib_speed_variation_config *g = &a->config;
-    const variation_trouble *t;
+    const trouble *t;
     double speed = fabs(g->speed_rpm), at_mean = g->power_w / spindle_rad_s(speed);
     gib_speed_variation_input *in = &a->in;
     if ((t = now(a, VARIATION_OVERRIDE)) != NULL && a->cycle > 1) {
@@ -295,7 +278,7 @@ static void spoil(variation_adversary *a)
 /* The spindle follows: the feed-forward at once, the speed by the end of the cycle. */
 static void follow(variation_adversary *a)
 {
-    const variation_trouble *t = now(a, VARIATION_DRIVE_WEAK);
+    const trouble *t = now(a, VARIATION_DRIVE_WEAK);
     double cut = a->true_cutting_nm - a->s.c.cutting_nm, torque = a->out.torque_nm;
     int at_work = a->out.status == GIB_BUSY, cycles = 1 + (now(a, VARIATION_CYCLES_LONG) ? (int)between(a, 0.0, 3.0) : 0);
     a->s.c.torque_limit_nm = t ? t->size * a->config.power_w / fabs(a->s.w) : 1e12;
@@ -313,8 +296,8 @@ static int32_t cycle(variation_adversary *a)
     gib_speed_variation_input before = a->last;
     int was_busy = a->before.status == GIB_BUSY;
     a->cycle++;
-    for (int i = 0; a->run == 0 && i < a->troubles; i++) {
-        a->trouble[i].begun |= a->trouble[i].at == a->cycle;
+    if (a->run == 0) {
+        troubles_begin(&a->troubles, a->cycle);
     }
     ask(a);
     if (begins(a, VARIATION_ABORT_CALL)) {

@@ -7,6 +7,7 @@
 #define VARIATION_ADVERSARY_H
 
 #include "spindle_run.h"
+#include "troubles.h"
 
 typedef enum {
     VARIATION_OVERRIDE,   /* the mean speed goes up and down, within its bounds, in every cycle */
@@ -45,18 +46,12 @@ typedef enum {
     VARIATION_MISTAKES
 } variation_mistake;
 
-typedef struct {
-    int kind, at, lasts; /* cycles */
-    double size;
-    int begun;
-} variation_trouble;
-
 enum { VARIATION_MOST_TROUBLES = 4, VARIATION_MEMORY = 4096 };
 
 typedef struct {
     gib_speed_variation_config config;
-    variation_trouble trouble[VARIATION_MOST_TROUBLES];
-    int troubles, cycles;
+    troubles troubles;
+    int cycles;
     variation_mistake mistake;
     uint64_t random;
     spindle s;
