@@ -1,12 +1,9 @@
 /*
- * Offsets of four and five axes against a machine written out in 4 x 4 matrices: a rotary axis is a turn about a line
- * through its pivot; what it carries comes after it. Any letters, order, side, sense, angles and pivots.
- *
- *   workpiece: W = T1(q1)*T2(q2)     tool: S likewise     a fixed surface moves by W(new)*W(measured)^-1, the tip by S
- *
- * The measurement is fed with the exact load of a plane, so what is left is what the offsets leave.
+ * Offsets of four and five axes against a machine written out in matrices, see tilt_matrices.h. The measurement is fed with the exact
+ * load of a plane, so what is left is what the offsets leave.
  */
 #include "tilt_laws.h"
+#include "tilt_matrices.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -15,94 +12,6 @@
 #include <stdio.h>
 
 #include <cmocka.h>
-
-typedef struct {
-    double m[4][4];
-} matrix;
-
-typedef struct {
-    int letter, turns_tool, sense; /* letter 1, 2, 3: about x, y, z; 0: none */
-    double pivot[3];               /* with all axes at 0 */
-} axis;
-
-static const matrix ONE = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
-
-static matrix product(const matrix *a, const matrix *b)
-{
-    matrix c;
-    for (int i = 0; i < 4; i++) {
-        for (int j = 0; j < 4; j++) {
-            c.m[i][j] = 0.0;
-            for (int k = 0; k < 4; k++) {
-                c.m[i][j] += a->m[i][k] * b->m[k][j];
-            }
-        }
-    }
-    return c;
-}
-
-static matrix shift(const double by[3], double sign)
-{
-    matrix t = ONE;
-    for (int i = 0; i < 3; i++) {
-        t.m[i][3] = sign * by[i];
-    }
-    return t;
-}
-
-/* A turn about a line through the pivot, along the letter. */
-static matrix turn(const axis *a, double degrees)
-{
-    matrix r = ONE;
-    double q = a->sense * degrees * 3.14159265358979323846 / 180.0, c = cos(q), s = sin(q);
-    int i = a->letter % 3, j = (a->letter + 1) % 3; /* about x: y toward z, and so on */
-    r.m[i][i] = r.m[j][j] = c;
-    r.m[i][j] = -s;
-    r.m[j][i] = s;
-    matrix there = shift(a->pivot, 1.0), back = shift(a->pivot, -1.0), half = product(&there, &r);
-    return product(&half, &back);
-}
-
-/* Inverse of a rigid motion. */
-static matrix undone(const matrix *a)
-{
-    matrix t = ONE;
-    for (int i = 0; i < 3; i++) {
-        t.m[i][3] = 0.0;
-        for (int j = 0; j < 3; j++) {
-            t.m[i][j] = a->m[j][i];
-            t.m[i][3] -= a->m[j][i] * a->m[j][3];
-        }
-    }
-    return t;
-}
-
-static void apply(const matrix *a, const double v[3], double w, double out[3])
-{
-    for (int i = 0; i < 3; i++) {
-        out[i] = a->m[i][0] * v[0] + a->m[i][1] * v[1] + a->m[i][2] * v[2] + a->m[i][3] * w;
-    }
-}
-
-/* All axes of one side, the one nearest the bed first. */
-static matrix chain(const axis axes[2], const double angles[3], int tool)
-{
-    matrix all = ONE;
-    for (int i = 0; i < 2; i++) {
-        if (axes[i].letter && axes[i].turns_tool == tool) {
-            matrix t = turn(&axes[i], angles[axes[i].letter - 1]);
-            all = product(&all, &t);
-        }
-    }
-    return all;
-}
-
-/* How that side has moved since the measurement. */
-static matrix moved(const axis axes[2], const double before[3], const double after[3], int tool)
-{
-    matrix was = chain(axes, before, tool), is = chain(axes, after, tool), back = undone(&was);
-    return product(&is, &back);
-}
 
 static uint64_t seed = 42;
 
@@ -199,55 +108,23 @@ static gib_tilt_config usual(void)
     return g;
 }
 
-/*
- * What the machine then cuts, by matrices: depth under the tip at corners of the path, and the sine between the tool's
- * axis and the surface's normal.
- */
-static double judge(const axis axes[2], const double angles[3], double gx, double gy, const outcome *o, double depth[3])
+/* What the machine then cuts: depth under the tip at corners of the path, and the sine between the tool's axis and the normal. */
+static double judge(const tilt_axis axes[2], const double angles[3], double gx, double gy, const outcome *o, double depth[3])
 {
-    double after[3];
-    for (int i = 0; i < 3; i++) {
-        after[i] = angles[i] + o->out.offset_deg[i];
-    }
-    matrix work = moved(axes, angles, after, 0), tool = moved(axes, angles, after, 1);
-    double length = sqrt(1.0 + gx * gx + gy * gy), up[3] = {-gx / length, -gy / length, 1.0 / length}, z[3] = {0, 0, 1},
-           zero[3] = {0}, normal[3], spindle[3], tip[3], point[3], on[3] = {START[0], START[1], START[2] + DEPTH};
-    apply(&work, up, 0.0, normal);
-    apply(&tool, z, 0.0, spindle);
-    apply(&tool, zero, 1.0, tip); /* the pivots of the tool's side are given from its tip */
-    apply(&work, on, 1.0, point);
+    tilt_plane plane = {gx, gy, DEPTH, {START[0], START[1], START[2]}, {angles[0], angles[1], angles[2]}};
+    double apart = 0.0;
     for (int corner = 0; corner < 3; corner++) {
-        double at[3] = {START[0] + (corner == 1 ? LENGTH : 0) + o->out.offset_mm[0] + tip[0],
-                        START[1] + (corner == 2 ? WIDTH : 0) + o->out.offset_mm[1] + tip[1],
-                        START[2] + o->plane[corner] + tip[2]};
-        double surface = point[2] - (normal[0] * (at[0] - point[0]) + normal[1] * (at[1] - point[1])) / normal[2];
-        depth[corner] = surface - at[2];
+        double offset[3] = {o->out.offset_mm[0], o->out.offset_mm[1], o->plane[corner]};
+        depth[corner] = tilt_axes_depth(axes, &plane, offset, o->out.offset_deg, START[0] + (corner == 1 ? LENGTH : 0),
+                                        START[1] + (corner == 2 ? WIDTH : 0), &apart);
     }
-    double cross[3] = {normal[1] * spindle[2] - normal[2] * spindle[1], normal[2] * spindle[0] - normal[0] * spindle[2],
-                       normal[0] * spindle[1] - normal[1] * spindle[0]};
-    return sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]);
-}
-
-/* Puts the machine's axes into a configuration: pivots as they lie at the angles of the measurement. */
-static void configure(gib_tilt_config *g, const axis axes[2], const double angles[3])
-{
-    for (int i = 0; i < 2; i++) {
-        double p[3] = {axes[i].pivot[0], axes[i].pivot[1], axes[i].pivot[2]};
-        if (i == 1 && axes[0].letter && axes[0].turns_tool == axes[1].turns_tool) {
-            matrix carried = turn(&axes[0], angles[axes[0].letter - 1]);
-            apply(&carried, axes[1].pivot, 1.0, p);
-        }
-        g->rotary[i].axis = axes[i].letter;
-        g->rotary[i].turns_tool = axes[i].turns_tool;
-        g->rotary[i].sense = axes[i].sense;
-        memcpy(g->rotary[i].pivot_mm, p, sizeof p);
-    }
+    return apart;
 }
 
 static void three_axes_follow_the_plane(void **state)
 {
     (void)state;
-    const axis none[2] = {{0}};
+    const tilt_axis none[2] = {{0}};
     const double angles[3] = {0};
     for (int i = 0; i < 4; i++) {
         double gx = between(-0.03, 0.03), gy = between(-0.03, 0.03), depth[3];
@@ -277,7 +154,7 @@ static void five_axes_against_matrices(void **state)
                 if (first == second) {
                     continue;
                 }
-                axis axes[2] = {{first, sides & 1, between(0, 1) < 0.5 ? 1 : -1, {0}},
+                tilt_axis axes[2] = {{first, sides & 1, between(0, 1) < 0.5 ? 1 : -1, {0}},
                                 {second, sides >> 1, between(0, 1) < 0.5 ? 1 : -1, {0}}};
                 double angles[3] = {between(-40, 40), between(-40, 40), between(-60, 60)}, depth[3];
                 double gx = between(-0.03, 0.03), gy = between(-0.03, 0.03), before = hypot(gx, gy);
@@ -287,7 +164,7 @@ static void five_axes_against_matrices(void **state)
                     }
                 }
                 gib_tilt_config g = usual();
-                configure(&g, axes, angles);
+                tilt_axes_configure(&g, axes, angles);
                 outcome o = measured(&g, gx, gy, angles);
                 cases++;
                 if (o.status == GIB_ERR_TILT_SIZE) {
@@ -331,11 +208,11 @@ static void with_tool_centre_point_only_the_axis_turns(void **state)
 static void the_matrices_are_right(void **state)
 {
     (void)state;
-    const axis axes[2] = {{3, 0, 1, {0}}, {2, 0, 1, {10, 0, 0}}};
+    const tilt_axis axes[2] = {{3, 0, 1, {0}}, {2, 0, 1, {10, 0, 0}}};
     const double angles[3] = {0, 90, 90}, p[3] = {11, 0, 0};
     double q[3];
-    matrix w = chain(axes, angles, 0), back = undone(&w), one = product(&w, &back);
-    apply(&w, p, 1.0, q); /* B takes (11,0,0) about x = 10 to (10,0,-1), C that to (0,10,-1) */
+    matrix w = tilt_axes_chain(axes, angles, 0), back = matrix_undone(&w), one = matrix_product(&w, &back);
+    matrix_apply(&w, p, 1.0, q); /* B takes (11,0,0) about x = 10 to (10,0,-1), C that to (0,10,-1) */
     assert_true(fabs(q[0]) < 1e-12 && fabs(q[1] - 10) < 1e-12 && fabs(q[2] + 1) < 1e-12);
     for (int i = 0; i < 4; i++) {
         for (int j = 0; j < 4; j++) {

@@ -8,9 +8,13 @@
 //!
 //! The wear w is fitted where the passes can tell it from tilt: where at least a tenth of the variance of s is not explained
 //! by position, as after a reversed or repeated pass. Where not, w = 0 is assumed with the standard uncertainty that the
-//! configuration expects. Residuals that follow each other widen the uncertainty by (1 + ρ)/(1 − ρ), ρ their correlation.
+//! configuration expects. Residuals that follow each other widen the uncertainty by (1 + ρ)/(1 − ρ), ρ their correlation; few blocks
+//! widen it as Student's t does. The unknowns take their part of both: of n residuals of least absolute deviations as many are 0
+//! as there are unknowns, so the median is that of the others, and their correlation comes out too low by unknowns/n.
 //!
 //! All of it goes on in slices, so that no cycle is long.
+
+mod read;
 
 use super::normal::{Factors, Square};
 use super::trace::Block;
@@ -29,6 +33,8 @@ const SIGMA_OF_MEDIAN: f64 = 1.4826;
 const NARROW: f64 = 0.03;
 /// Share of the variance of the cut length that position must leave unexplained.
 const SEPARABLE: f64 = 0.1;
+/// Student's t over 2 where the normal distribution has 2, by powers of 1/freedom: (z² + 1)/4 and (5z⁴ + 16z² + 3)/96 at z = 2.
+const STUDENT: [f64; 2] = [1.25, 1.53];
 /// Halvings that find a median.
 const HALVINGS: u32 = 26;
 
@@ -294,7 +300,7 @@ impl Fit {
 
     fn halve(&mut self, blocks: usize) {
         let middle = self.middle();
-        self.median[usize::from(2 * self.below >= blocks)] = middle;
+        self.median[usize::from(2 * self.below >= blocks + self.unknowns() as usize)] = middle;
         self.below = 0;
         self.halvings += 1;
         if self.halvings == HALVINGS {
@@ -305,18 +311,23 @@ impl Fit {
         }
     }
 
+    fn unknowns(&self) -> u32 {
+        2 + u32::from(self.planar) + u32::from(self.separable)
+    }
+
     /// What the residuals of the pass say of the noise.
     fn scatter(&mut self) {
         let [_, n, weights, psi, psi2, slope, lag] = self.sums;
-        let unknowns = 2.0 + f64::from(u8::from(self.planar)) + f64::from(u8::from(self.separable));
+        let unknowns = f64::from(self.unknowns());
         let freedom = (n - unknowns).max(1.0);
         let slope = (slope / n.max(1.0)).max(0.1);
         let mean = psi / n.max(1.0);
         let variance = (psi2 - n * mean * mean).max(0.0) / freedom / (slope * slope);
-        let follow = if psi2 > 0.0 { (lag / psi2).clamp(0.0, 0.95) } else { 0.0 };
+        let follow = if psi2 > 0.0 { (lag / psi2 + unknowns / n.max(1.0)).clamp(0.0, 0.95) } else { 0.0 };
         self.deviation = variance.sqrt();
+        let few = 1.0 + STUDENT[0] / freedom + STUDENT[1] / (freedom * freedom);
         // The normal matrix carries the weights.
-        self.noise = variance * (1.0 + follow) / (1.0 - follow) * weights / n.max(1.0);
+        self.noise = few * few * variance * (1.0 + follow) / (1.0 - follow) * weights / n.max(1.0);
     }
 
     /// Covariance of the unknowns by the last pass.
@@ -330,19 +341,6 @@ impl Fit {
             }
         }
         self.stage = Stage::Done;
-    }
-
-    /// Bounds of the path, from its start: x then y, low then high, mm.
-    #[must_use]
-    pub fn extent(&self) -> [[f64; 2]; 2] {
-        self.bounds
-    }
-
-    /// Value of the plane at x y (mm from the start of the path) for the tool as it was at the start.
-    #[must_use]
-    pub fn at(&self, x: f64, y: f64) -> f64 {
-        let row = self.basis(&Block { x, y, ..Block::default() });
-        self.beta[0] + self.beta[1] * row[1] + self.beta[2] * row[2]
     }
 }
 

@@ -72,7 +72,7 @@ pub struct Tilt {
     usual: Usual,
     /// Z follows the path, and all other offsets rest.
     following: bool,
-    /// Largest z offset and its largest step; largest sum of an input, and largest change of a step.
+    /// Largest z offset and largest step of a usual cycle; largest sum of an input, and largest change of a step.
     bounds: [f64x2; 2],
     alike: u32,
     granted: u32,
@@ -272,7 +272,7 @@ impl Tilt {
     }
 
     fn judge(&mut self) {
-        if let Err(fault) = trusted(&self.plan, &self.trace, self.fit.rejected) {
+        if let Err(fault) = trusted(&self.plan, &self.trace, &self.fit) {
             self.report = counted(&self.trace, &self.fit);
             return self.leave(fault);
         }
@@ -306,11 +306,11 @@ impl Tilt {
         let size = |field, value: f64, high: f64| Fault { code: GIB_ERR_TILT_SIZE, field, value, low: -high, high };
         let linear = largest.max(self.offsets.linear[0].abs()).max(self.offsets.linear[1].abs());
         let angular = a.max(b).max(c);
-        if !(linear <= self.plan.most_mm) {
-            return self.leave(size("offset_max_mm\0", linear, self.plan.most_mm));
+        if !(linear <= self.plan.linear.most) {
+            return self.leave(size("offset_max_mm\0", linear, self.plan.linear.most));
         }
-        if !(angular <= self.plan.most_deg) {
-            return self.leave(size("offset_max_deg\0", angular, self.plan.most_deg));
+        if !(angular <= self.plan.angular.most) {
+            return self.leave(size("offset_max_deg\0", angular, self.plan.angular.most));
         }
         self.report.offset_mm = self.offsets.linear;
         self.report.offset_deg = self.offsets.angular;
@@ -326,13 +326,13 @@ impl Tilt {
             self.report.decision = GIB_TILT_DECLINED;
             self.enter(Phase::Done);
         } else if input.acknowledged_id == self.output.request_id {
-            let time = |most: f64, bounds: &super::follow::Bounds| {
-                most / bounds.speed
+            let time = |bounds: &super::follow::Bounds| {
+                bounds.most / bounds.speed
                     + 4.0 * bounds.speed / bounds.acceleration
-                    + 4.0 * (most / bounds.acceleration).sqrt()
+                    + 4.0 * (bounds.most / bounds.acceleration).sqrt()
             };
             // Four times what a ramp to the largest offsets takes while z's target moves with the path.
-            let ramp = time(self.plan.most_mm, &self.plan.linear).max(time(self.plan.most_deg, &self.plan.angular));
+            let ramp = time(&self.plan.linear).max(time(&self.plan.angular));
             self.left = (4.0 * ramp + 100.0) as u32;
             self.enter(Phase::RampOn);
         } else if self.left == 0 {
@@ -368,7 +368,7 @@ impl Tilt {
 
     /// A cycle with offsets in force that is not a quick one.
     fn bring_in(&mut self, input: &TiltInput) -> bool {
-        let most = self.plan.most_mm;
+        let most = self.plan.linear.most;
         let wanted = self.z_target(input);
         let z = wanted.max(-most).min(most);
         let [x, y, _] = self.offsets.linear;

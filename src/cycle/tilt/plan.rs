@@ -47,10 +47,6 @@ pub struct Plan {
     pub band_load: f64,
     /// Depth to be cut; 0: that at the start.
     pub nominal_depth: f64,
-    /// Largest offsets.
-    pub most_mm: f64,
-    /// Largest angular offsets.
-    pub most_deg: f64,
     /// Bounds of x, y and z, per cycle.
     pub linear: Bounds,
     /// Bounds of a, b and c, per cycle.
@@ -83,10 +79,8 @@ impl Plan {
         band_deg: 0.0,
         band_load: 0.0,
         nominal_depth: 0.0,
-        most_mm: 0.0,
-        most_deg: 0.0,
-        linear: Bounds { speed: 1e-3, acceleration: 1e-6 },
-        angular: Bounds { speed: 1e-3, acceleration: 1e-6 },
+        linear: Bounds { speed: 1e-3, acceleration: 1e-6, most: 0.0 },
+        angular: Bounds { speed: 1e-3, acceleration: 1e-6, most: 0.0 },
         ack_timeout: 0,
         inverse: Inverse::REST,
     };
@@ -111,6 +105,8 @@ impl Plan {
         let tolerance = or(c.condition_tolerance_ratio, 0.05);
         let tolerance = in_range("condition_tolerance_ratio\0", tolerance, 0.001, 0.5)?;
         let around = |value: f64| [value * (1.0 - tolerance), value * (1.0 + tolerance)];
+        let most_mm = in_range("offset_max_mm\0", or(c.offset_max_mm, 5.0), 0.001, 100.0)?;
+        let most_deg = in_range("offset_max_deg\0", or(c.offset_max_deg, 5.0), 0.001, 45.0)?;
         let mm_s = in_range("offset_speed_mm_s\0", or(c.offset_speed_mm_s, 20.0), 0.001, 1000.0)?;
         let mm_s2 = in_range("offset_acceleration_mm_s2\0", or(c.offset_acceleration_mm_s2, 100.0), 0.01, 1e5)?;
         let deg_s = in_range("offset_speed_deg_s\0", or(c.offset_speed_deg_s, 1.0), 1e-4, 1000.0)?;
@@ -140,10 +136,8 @@ impl Plan {
             band_deg: in_range("band_deg\0", c.band_deg, 0.0, 45.0)?,
             band_load: in_range("band_load\0", c.band_load, 0.0, 1e9)?,
             nominal_depth: in_range("nominal_depth_mm\0", c.nominal_depth_mm, 0.0, 1000.0)?,
-            most_mm: in_range("offset_max_mm\0", or(c.offset_max_mm, 5.0), 0.001, 100.0)?,
-            most_deg: in_range("offset_max_deg\0", or(c.offset_max_deg, 5.0), 0.001, 45.0)?,
-            linear: Bounds { speed: mm_s * cycle, acceleration: mm_s2 * cycle * cycle },
-            angular: Bounds { speed: deg_s * cycle, acceleration: deg_s2 * cycle * cycle },
+            linear: Bounds { speed: mm_s * cycle, acceleration: mm_s2 * cycle * cycle, most: most_mm },
+            angular: Bounds { speed: deg_s * cycle, acceleration: deg_s2 * cycle * cycle, most: most_deg },
             ack_timeout: cycles(in_range("ack_timeout_s\0", or(c.ack_timeout_s, 60.0), 2.0 * cycle, 3600.0)?),
             inverse: Inverse::REST,
         })
@@ -200,7 +194,7 @@ pub(crate) mod tests {
     #[test]
     fn zero_means_default_and_bad_fields_are_named() {
         let plan = Plan::new(&valid()).unwrap();
-        assert!(plan.block_cycles >= 100.0 && plan.most_mm == 5.0 && plan.rotary[0].sense == 1);
+        assert!(plan.block_cycles >= 100.0 && plan.linear.most == 5.0 && plan.rotary[0].sense == 1);
         let a = TiltRotary { axis: GIB_TILT_AXIS_A, ..TiltRotary::default() };
         let slow = TiltCondition { speed_rpm: f64::NAN, ..valid().condition };
         for (config, field) in [

@@ -6,6 +6,9 @@ use super::plan::Plan;
 /// Blocks that a path can have.
 pub const BLOCKS: usize = 2048;
 
+/// Times its feed that no tool moves in the cut: an override stays below twice.
+const JUMP: f64 = 5.0;
+
 /// One block.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Block {
@@ -49,6 +52,11 @@ pub struct Trace {
     cut: f64,
     along: f64,
     last: Option<([f64; 2], f64)>,
+    /// Load of the last block that counted, and how many have had that of the one before.
+    load: f64,
+    repeated: u32,
+    /// Blocks at a speed that no tool in the cut has.
+    jumped: u32,
     /// Way in the present pass behind which its blocks do not count, once it has ended.
     exit: Option<f64>,
     /// What was left out.
@@ -66,6 +74,9 @@ impl Default for Trace {
             cut: 0.0,
             along: 0.0,
             last: None,
+            load: 0.0,
+            repeated: 0,
+            jumped: 0,
             exit: None,
             counts: Counts::default(),
         }
@@ -80,6 +91,7 @@ impl Trace {
         self.origin = origin;
         self.cut = 0.0;
         self.exit = None;
+        (self.load, self.repeated, self.jumped) = (f64::INFINITY, 0, 0);
         self.counts = Counts::default();
         self.begin_pass();
     }
@@ -126,6 +138,7 @@ impl Trace {
         if self.along < plan.entry {
             return false;
         }
+        self.jumped += u32::from(feed > JUMP * plan.feed[1]);
         let within = |value: f64, [low, high]: [f64; 2]| value >= low && value <= high;
         if !(within(mean.speed, plan.speed) && within(feed, plan.feed)) {
             self.counts.off_condition += 1;
@@ -137,6 +150,9 @@ impl Trace {
             self.counts.aliased += 1;
             return false;
         }
+        // The sums of a constant differ by their rounding.
+        self.repeated += u32::from((mean.load - self.load).abs() <= 1e-9 * mean.load);
+        self.load = mean.load;
         let read = if teach { Some((mean.load, 1.0)) } else { plan.inverse.curved(mean.load) };
         let Some((value, gain)) = read else {
             self.counts.outside += 1;
@@ -148,6 +164,18 @@ impl Trace {
         *place = block;
         self.used += 1;
         true
+    }
+
+    /// Blocks within a pass that were reached by a jump.
+    #[must_use]
+    pub fn jumped(&self) -> u32 {
+        self.jumped
+    }
+
+    /// Blocks that had exactly the load of the one before.
+    #[must_use]
+    pub fn repeated(&self) -> u32 {
+        self.repeated
     }
 
     /// The blocks that count.

@@ -7,7 +7,7 @@
 use super::fit::{FEWEST, Fit};
 use super::plan::Plan;
 use super::table::two_point;
-use super::trace::{Counts, Trace};
+use super::trace::{Block, Counts, Trace};
 use crate::error::*;
 
 /// Not decided yet.
@@ -112,7 +112,8 @@ pub struct TiltReport {
 ///
 /// # Errors
 /// `GIB_ERR_TILT_…` with the count at fault and the count allowed.
-pub fn trusted(plan: &Plan, trace: &Trace, rejected: u32) -> Result<(), Fault> {
+pub fn trusted(plan: &Plan, trace: &Trace, fit: &Fit) -> Result<(), Fault> {
+    let rejected = fit.rejected;
     let Counts { off_condition, outside, aliased } = trace.counts;
     let used = trace.blocks().len() as u32;
     let at_most = |code, field, value: u32, high: u32| {
@@ -124,6 +125,12 @@ pub fn trusted(plan: &Plan, trace: &Trace, rejected: u32) -> Result<(), Fault> {
         at_most(GIB_ERR_TILT_CONDITION, "off_condition\0", off_condition, (used + off_condition) / 3)?;
     }
     at_most(GIB_ERR_TILT_RANGE, "load\0", outside, (used + outside) / 3)?;
+    // A load that never changes is none. One on a coarse grid may rest for long; the waves of a current do not come out the same twice.
+    let resting = if plan.squared > 0.0 { used.max(FEWEST as u32) / 3 } else { used.saturating_sub(2) };
+    at_most(GIB_ERR_TILT_DATA, "load\0", trace.repeated(), resting)?;
+    // One at its limit says the same wherever it is there; what is not is then thrown out, and the rest has no scatter.
+    at_most(GIB_ERR_TILT_DATA, "load\0", if fit.exact() { rejected } else { 0 }, 0)?;
+    at_most(GIB_ERR_TILT_DATA, "position_mm\0", trace.jumped(), 0)?;
     if trace.blocks().len() < FEWEST {
         let (value, low) = (f64::from(used), FEWEST as f64);
         return Err(Fault {
@@ -265,10 +272,13 @@ fn by_fit(fit: &Fit) -> Slope {
     }
 }
 
-/// Two readings, each with the scatter of a block.
+/// Two readings, each with the scatter of a block, or with what it departs from the plane where that is more, as in a chip or
+/// at an entry; and with the wear between them, which looks like a slope and which two points cannot tell.
 fn by_points(fit: &Fit, [c, s]: [f64; 2], slope: f64, length: f64) -> Slope {
-    let error = |gain: f64| fit.deviation / gain.max(1e-300) / length.max(1e-3);
-    let variance =
-        error(fit.ends[0].gain) * error(fit.ends[0].gain) + error(fit.ends[1].gain) * error(fit.ends[1].gain);
+    let [near, far] = &fit.ends;
+    let error = |end: &Block| fit.deviation.max(fit.residual(end).abs()) / end.gain.max(1e-300);
+    let wear = fit.beta[3] * fit.beta[3] + fit.covariance[3][3].max(0.0);
+    let (one, other, worn) = (error(near), error(far), fit.at(far.x, far.y) * (far.cut - near.cut));
+    let variance = (one * one + other * other + wear * worn * worn) / (length * length).max(1e-6);
     Slope { at: [c * slope, s * slope], xx: c * c * variance, xy: c * s * variance, yy: s * s * variance }
 }

@@ -77,7 +77,9 @@ impl Tilt {
         self.following = self.phase == Phase::Active && self.settled;
         if self.following {
             let z = &self.plan.linear;
-            self.bounds = [[self.plan.most_mm, z.speed], [HUGE, z.acceleration]].map(f64x2::new);
+            // So near the largest offset that braking within it may be due, other cycles see to that.
+            let speed = z.speed.min(z.stops(0.25 * z.most));
+            self.bounds = [[z.most - z.braking(speed), speed], [HUGE, z.acceleration]].map(f64x2::new);
         }
         self.usual = match self.phase {
             Phase::Measuring if self.cutting => {
