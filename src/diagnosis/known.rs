@@ -10,6 +10,7 @@ use super::frame::Frame;
 use super::many::dot;
 use crate::machine::{Axis, Cause, Effect};
 use nalgebra::{Matrix3, Vector3};
+use std::collections::VecDeque;
 
 /// How exactly a law holds on a machine, as a share of what it makes near by.
 const LAW_HOLDS: f64 = 1.0 / 30.0;
@@ -66,7 +67,8 @@ impl Known {
                 own.iter_mut().zip(of(trace)).for_each(|(own, value)| *own += factor * value);
             }
             sum.iter_mut().zip(&own).for_each(|(sum, own)| *sum += own);
-            let most = largest_near(frame, &own);
+            let reach = (NEAR_S / frame.columns.period_s) as usize;
+            let most = largest_near(&frame.kept, reach, &own);
             doubt.iter_mut().zip(most).for_each(|(doubt, most)| *doubt = doubt.hypot(holds * most));
         };
         channel(|t| &t.torque, in_torque, &mut self.trace.torque, &mut self.doubt.torque);
@@ -74,20 +76,28 @@ impl Known {
     }
 }
 
-/// The largest magnitude among the judged rows near each of them.
-fn largest_near(frame: &Frame, values: &[f64]) -> Vec<f64> {
-    let reach = (NEAR_S / frame.columns.period_s) as usize;
-    let (mut first, mut end) = (0, 0);
-    let near = |(k, &row): (usize, &usize)| {
-        while frame.kept[first] + reach < row {
-            first += 1;
-        }
-        while end < values.len() && (frame.kept[end] <= row + reach || end <= k) {
+/// The largest magnitude among the judged rows that are no more than `reach` rows from each of them.
+fn largest_near(kept: &[usize], reach: usize, values: &[f64]) -> Vec<f64> {
+    // Places that may still hold the largest of some row ahead, in order: each is larger than all after it.
+    let mut candidates: VecDeque<usize> = VecDeque::new();
+    let mut end = 0;
+    let near = |&row: &usize| {
+        while end < values.len() && kept[end] <= row + reach {
+            let size = values[end].abs();
+            while candidates.back().is_some_and(|&last| values[last].abs() <= size) {
+                candidates.pop_back();
+            }
+            if !size.is_nan() {
+                candidates.push_back(end);
+            }
             end += 1;
         }
-        values[first..end].iter().fold(0.0f64, |most, value| most.max(value.abs()))
+        while candidates.front().is_some_and(|&first| kept[first] + reach < row) {
+            candidates.pop_front();
+        }
+        candidates.front().map_or(0.0, |&first| values[first].abs())
     };
-    frame.kept.iter().take(values.len()).enumerate().map(near).collect()
+    kept.iter().take(values.len()).map(near).collect()
 }
 
 fn regressors(frame: &Frame, effect: &Effect, shape: Vec<f64>) -> Vec<Trace> {
@@ -165,4 +175,28 @@ fn by_its_law(frame: &Frame, effect: &Effect) -> Option<(Vec<f64>, Vec<f64>)> {
         | Backlash { .. }
         | DriveCompliance { .. } => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_near_is_that_of_all_rows_near() {
+        let mut noise = crate::plant::noise::Noise::new(3);
+        for reach in [0, 1, 7, 25, 1000] {
+            let mut kept = vec![0];
+            // Rows in a row, and holes between them that are longer than the reach.
+            (0..400).for_each(|k| kept.push(kept[k] + if noise.uniform() < 0.9 { 1 } else { 40 }));
+            // Coarse, so that many are equal, and some are no numbers.
+            let value = |_| (6.0 * noise.uniform() - 3.0).round() * if noise.uniform() < 0.05 { f64::NAN } else { 1.0 };
+            let values: Vec<f64> = (0..kept.len() - 3).map(value).collect();
+            let found = largest_near(&kept, reach, &values);
+            assert_eq!(found.len(), values.len());
+            for (row, found) in kept.iter().zip(found) {
+                let near = kept.iter().zip(&values).filter(|(other, _)| other.abs_diff(*row) <= reach);
+                assert_eq!(near.fold(0.0f64, |most, (_, value)| most.max(value.abs())), found);
+            }
+        }
+    }
 }

@@ -298,19 +298,8 @@ fn position_spectrum(pieces: &[&[f64]], length: usize) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::noise::uniform_noise as noise;
     use super::*;
-
-    /// Uniform noise of unit variance from a fixed start.
-    fn noise(n: usize) -> Vec<f64> {
-        let mut state = 88_172_645_463_325_252_u64;
-        let mut next = move || {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
-        (0..n).map(|_| next() * 12f64.sqrt()).collect()
-    }
 
     #[test]
     fn a_sine_keeps_phase_and_its_derivatives_are_exact_to_the_filter_s_gain() {

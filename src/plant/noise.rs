@@ -34,6 +34,13 @@ impl Noise {
     }
 }
 
+/// Uniform noise of unit variance, for tests.
+#[cfg(test)]
+pub(super) fn uniform_noise(n: usize) -> Vec<f64> {
+    let mut noise = Noise::new(1);
+    (0..n).map(|_| (noise.uniform() - 0.5) * 12f64.sqrt()).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

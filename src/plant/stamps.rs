@@ -73,20 +73,9 @@ fn beside_cubic(t: [f64; 5], x: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::noise::uniform_noise as noise;
     use super::*;
     use std::f64::consts::TAU;
-
-    /// Uniform noise of unit variance from a fixed start.
-    fn noise(n: usize) -> Vec<f64> {
-        let mut state = 88_172_645_463_325_252_u64;
-        let mut next = move || {
-            state ^= state << 13;
-            state ^= state >> 7;
-            state ^= state << 17;
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
-        (0..n).map(|_| next() * 12f64.sqrt()).collect()
-    }
 
     #[test]
     fn the_motion_tells_when_rows_were_taken() {
