@@ -31,7 +31,7 @@ pub struct Hole {
     pub missing: usize,
 }
 
-/// Stamps on either side by which a lost row is told from jitter.
+/// Most stamps on either side by which a lost row is told from jitter.
 const STAMPS: usize = 8;
 /// The deviations of their means by which a row must be gone before it is called lost.
 const SURELY: f64 = 4.0;
@@ -56,17 +56,17 @@ impl Sampling {
         let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let middle = steps.len() / 2;
         let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-        let mut deviations: Vec<f64> = steps.iter().map(|step| (step - median).abs()).collect();
-        let scatter = *deviations.select_nth_unstable_by(middle, f64::total_cmp).1;
-        drop(deviations);
+        steps.iter_mut().for_each(|step| *step = (*step - median).abs());
+        let scatter = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+        drop(steps);
         // Half a period missing is the least a lost row can leave in a regular recording; ten times the scatter keeps
         // honest irregular sampling (its steps spread about as widely as their median) from being called gaps.
         let mut gap_s = (1.5 * median).max(median + 10.0 * scatter);
         // What happens every few rows is the sampling itself, not a loss.
-        if steps.iter().filter(|step| **step > gap_s).count() > steps.len() / 50 {
-            gap_s = 5.0 * (last - first) / steps.len() as f64;
+        let steps = time_s.len() - 1;
+        if time_s.windows(2).filter(|pair| pair[1] - pair[0] > gap_s).count() > steps / 50 {
+            gap_s = 5.0 * (last - first) / steps as f64;
         }
-        drop(steps);
         let holes = match Grid::of(time_s, scatter) {
             Some(grid) => grid.holes(time_s, gap_s),
             None => {
@@ -120,6 +120,8 @@ impl Sampling {
 /// An even grid about which stamps scatter, each for itself.
 struct Grid {
     period_s: f64,
+    /// As many stamps as tell a lost row from their scatter; more would take another hole among them for this one.
+    stamps: usize,
 }
 
 impl Grid {
@@ -140,8 +142,9 @@ impl Grid {
         let even = spread <= (STAMPS as f64).powf(0.25) * scatter_s.max(1e-3 * period_s);
         // Half a period must be sure by the median of as many stamps after a row and the mean of those before it.
         let scatter = 1.4826 / 2f64.sqrt() * scatter_s.max(spread) / period_s;
-        let of_means = ((1.0 + 0.5 * std::f64::consts::PI) / STAMPS as f64).sqrt();
-        (even && SURELY * of_means * scatter < 0.5).then_some(Self { period_s })
+        let of_means = |stamps: f64| ((1.0 + 0.5 * std::f64::consts::PI) / stamps).sqrt() * scatter;
+        let stamps = (SURELY * of_means(1.0) / WHOLE).powi(2).ceil().clamp(1.0, STAMPS as f64) as usize;
+        (even && SURELY * of_means(STAMPS as f64) < 0.5).then_some(Self { period_s, stamps })
     }
 
     /// Where rows are missing, and how many.
@@ -167,9 +170,9 @@ impl Grid {
     /// By how many periods the stamps from a row on come later than those since `start` foretell.
     fn late(&self, time_s: &[f64], start: usize, row: usize) -> f64 {
         let place = |i: usize| (time_s[i] - time_s[row - 1]) / self.period_s - (i as f64 - (row - 1) as f64);
-        let before = start.max(row.saturating_sub(STAMPS))..row;
+        let before = start.max(row.saturating_sub(self.stamps))..row;
         let foretold = before.clone().map(place).sum::<f64>() / before.len() as f64;
-        let mut after: Vec<f64> = (row..(row + STAMPS).min(time_s.len())).map(place).collect();
+        let mut after: Vec<f64> = (row..(row + self.stamps).min(time_s.len())).map(place).collect();
         after.sort_unstable_by(f64::total_cmp);
         // The row itself must have come late as well: it is the first one after the hole.
         let middle = 0.5 * (after[(after.len() - 1) / 2] + after[after.len() / 2]);
@@ -235,6 +238,16 @@ mod tests {
             assert_eq!(found, [(70, 1), (1499, 2), (3997, 1), (4016, 1), (8995, 1), (14_994, 1)], "{share}");
             assert!((sampling.period_s / 1e-3 - 1.0).abs() < 1e-4, "{sampling:?}");
             assert!(Sampling::of(&scattered(share, &[])).1.is_empty());
+        }
+    }
+
+    #[test]
+    fn rows_lost_close_together_are_each_in_their_place() {
+        let lost = [3000, 3002, 3003, 5000, 5005, 5007];
+        for share in [0.0, 0.01] {
+            let (_, holes) = Sampling::of(&scattered(share, &lost));
+            let found: Vec<(usize, usize)> = holes.iter().map(|hole| (hole.row, hole.missing)).collect();
+            assert_eq!(found, [(3000, 1), (3001, 2), (4997, 1), (5001, 1), (5002, 1)], "{share}");
         }
     }
 
