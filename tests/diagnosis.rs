@@ -232,7 +232,7 @@ fn sign(v: f64) -> f64 {
 fn rows_that_are_not_used_are_told() {
     let whole = recording(|_, _, v, _| 0.3 * v.signum());
     let with = |change: fn(&mut Vec<f64>, &mut Vec<f64>, &mut Vec<f64>)| {
-        let (mut time, mut x) = (whole.time_s.clone(), whole.columns[0].values.clone());
+        let (mut time, mut x) = (whole.time_s.to_vec(), whole.columns[0].values.clone());
         let mut torque = whole.columns[1].values.clone();
         change(&mut time, &mut x, &mut torque);
         let columns = vec![Column::new("x.position_mm", x), Column::new("x.torque_nm", torque)];
@@ -251,7 +251,7 @@ fn rows_that_are_not_used_are_told() {
     assert!(judged(&whole).notes.is_empty());
     // A unit that is none of the format's is named, with those that are.
     let columns = vec![whole.columns[0].clone(), Column::new("x.torque_kn", whole.columns[1].values.clone())];
-    let d = judged(&Recording::from_columns("unit", whole.time_s.clone(), columns).unwrap());
+    let d = judged(&Recording::from_columns("unit", whole.time_s.to_vec(), columns).unwrap());
     assert!(["x.torque_kn", "\"kn\"", "nm"].iter().all(|word| d.missing[0].contains(word)), "{:?}", d.missing);
 }
 
@@ -325,7 +325,7 @@ fn too_little_data_is_said_with_what_is_missing() {
     };
     let short = judged(&cut(0..400));
     assert!(short.verdict == Verdict::InsufficientData && short.missing[0].contains("record"), "{short:?}");
-    let no_torque = Recording::from_columns("t", whole.time_s.clone(), vec![whole.columns[0].clone()]).unwrap();
+    let no_torque = Recording::from_columns("t", whole.time_s.to_vec(), vec![whole.columns[0].clone()]).unwrap();
     let blind = judged(&no_torque);
     assert!(blind.verdict == Verdict::InsufficientData && blind.missing[0].contains("x.torque_nm"), "{blind:?}");
 }

@@ -333,8 +333,8 @@ fn emps_fitted_on_three_laps_predicts_the_fourth() {
     let score = |axis: &Axis| {
         let p = predict(axis, &fourth).unwrap();
         let rest: Vec<f64> = fourth.torque.iter().zip(&p.torque.torque).map(|(m, p)| m - p).collect();
-        let low = smoothed(&rest, 1e-3, 100.0);
-        let moving = low.iter().zip(&fourth.motion.velocity).filter(|(_, v)| v.abs() > 4.0);
+        let low = smoothed(rest, 1e-3, 100.0);
+        let moving = low.iter().zip(fourth.motion.velocities()).filter(|(_, v)| v.abs() > 4.0);
         let replayed = p.closed_loop.unwrap().position;
         let apart = replayed.iter().zip(&fourth.position).map(|(p, m)| 1e3 * (p - m));
         (rms(moving.map(|(r, _)| *r)), rms(apart))

@@ -261,6 +261,6 @@ fn residual_of(belief: &Axis, truth: &Axis, seed: u64, scale: bool) -> f64 {
         Observed::from_columns(trace.time_s, trace.position, trace.torque, Some(trace.command), table, runs).unwrap();
     let predicted = predict_torque(belief, &observed).unwrap().torque;
     // Ten rows before and after a standstill are left out too: a late torque is that of another row.
-    let moving = |i: &usize| (i - 10..i + 10).all(|k| observed.motion.velocity[k].abs() > 0.4);
+    let moving = |i: &usize| (i - 10..i + 10).all(|k| observed.motion.velocity(k).abs() > 0.4);
     rms((10..predicted.len() - 10).filter(moving).map(|i| observed.torque[i] - predicted[i]))
 }

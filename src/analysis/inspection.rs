@@ -135,7 +135,7 @@ fn motion(recording: &Recording, channel: &str) -> Option<ChannelMotion> {
     let column = [Signal::Position, Signal::TablePosition, Signal::PositionCommand, Signal::Angle]
         .into_iter()
         .find_map(|signal| recording.get(channel, signal))?;
-    let rows = || column.values.iter().zip(&recording.time_s).filter(|(value, _)| value.is_finite());
+    let rows = || column.values.iter().zip(recording.time_s.iter()).filter(|(value, _)| value.is_finite());
     let position: Vec<f64> = rows().map(|(value, _)| *value).collect();
     let time_s: Vec<f64> = rows().map(|(_, time)| *time).collect();
     Some(ChannelMotion {

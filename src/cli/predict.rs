@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use gib::machine::Axis;
-use gib::plant::added::Added;
-use gib::plant::closed_loop::predict;
+use gib::plant::added::Pulses;
+use gib::plant::closed_loop::predict_motor;
 use gib::plant::linear;
 use gib::plant::observed::Observed;
 use gib::plant::servo::CommandSpeed;
-use gib::recording::{Recording, Signal};
+use gib::recording::{Column, Recording, Signal};
 use serde_json::{Map, Value, json};
 
 use super::{Answer, Result, machine_file};
@@ -20,7 +20,8 @@ use super::{Answer, Result, machine_file};
 /// Predicts the torque and, with a servo block, the closed-loop position of a recording
 ///
 /// Writes time_s, then for each axis that machine and recording share: measured, predicted and residual torque (force for
-/// linear drives), measured and simulated position. Rows in which the motion is not known (gaps) stay empty.
+/// linear drives), measured and simulated position. Over a few lost rows the motion goes on; rows in which it is not known stay
+/// empty.
 #[derive(Args)]
 pub struct Predict {
     /// The machine file, with or without effects
@@ -49,6 +50,8 @@ impl Predict {
             let file = self.recording.display();
             return Err(format!("{file}: no position column of an axis of the machine ({})", names.join(", ")).into());
         }
+        // Long recordings have no room for what is not used.
+        recording.columns.retain(|column| shared.iter().any(|axis| is_used(column, axis)));
         let axes: Vec<Predicted> =
             shared.iter().map(|axis| Predicted::of(axis, &mut recording)).collect::<std::result::Result<_, _>>()?;
         write(&self.out, &recording.time_s, &axes)?;
@@ -63,6 +66,14 @@ impl Predict {
     }
 }
 
+/// Whether an axis is predicted by a column: its table counts where it does not go with the motor.
+fn is_used(column: &Column, axis: &Axis) -> bool {
+    column.label.as_ref().is_none_or(|label| {
+        let elastic = || axis.two_masses().is_ok_and(|masses| masses.is_some());
+        label.channel == axis.name && (label.signal != Signal::TablePosition || elastic())
+    })
+}
+
 /// One axis, measured and predicted.
 struct Predicted<'a> {
     axis: &'a Axis,
@@ -70,18 +81,26 @@ struct Predicted<'a> {
     torque: Vec<f64>,
     phases_unknown: usize,
     position: Option<Vec<f64>>,
-    added: Option<Added>,
+    added: Option<Pulses>,
     command_speed: CommandSpeed,
 }
 
 impl<'a> Predicted<'a> {
     fn of(axis: &'a Axis, recording: &mut Recording) -> std::result::Result<Self, Box<dyn std::error::Error>> {
-        let observed = Observed::taken(recording, axis)?;
-        let prediction = predict(axis, &observed)?;
+        let mut observed = Observed::taken(recording, axis)?;
+        let prediction = predict_motor(axis, &mut observed)?;
         let position = prediction.closed_loop.map(|replayed| replayed.position);
         let (torque, phases_unknown) = (prediction.torque.torque, prediction.torque.phases_unknown);
         let (added, command_speed) = (prediction.added, prediction.command_speed);
         Ok(Self { axis, observed, torque, phases_unknown, position, added, command_speed })
+    }
+
+    /// The rows of the recording, without those that were put in between.
+    fn rows(&self) -> impl Iterator<Item = Row> {
+        self.observed.recorded().map(|(at, known)| {
+            let position = if known { self.observed.position[at] } else { f64::NAN };
+            Row { at, position }
+        })
     }
 
     fn residual(&self) -> impl Iterator<Item = f64> {
@@ -90,18 +109,25 @@ impl<'a> Predicted<'a> {
 
     fn figures(&self) -> Figures {
         let standing = self.observed.motion.standing_speed();
-        let moving = self.residual().zip(&self.observed.motion.velocity).filter(|(_, v)| v.abs() > standing);
-        let measured = &self.observed.position;
+        let moving = self.residual().zip(self.observed.motion.velocities()).filter(|(_, v)| v.abs() > standing);
         Figures {
             torque: rms(self.observed.torque.iter().copied()),
             residual: rms(self.residual()),
             moving: rms(moving.map(|(residual, _)| residual)),
-            position_um: self.position.as_ref().map(|p| 1e3 * rms(p.iter().zip(measured).map(|(p, m)| m - p))),
-            added: self.added.as_ref().map_or((0, 0.0), |added| (added.pulses, added.largest)),
+            position_um: self.position.as_ref().map(|p| 1e3 * rms(self.rows().map(|row| row.position - p[row.at]))),
+            added: self.added.map_or((0, 0.0), |added| (added.count, added.largest)),
             command_speed: self.command_speed,
             cutoff_hz: self.observed.motion.cutoff_hz,
         }
     }
+}
+
+/// A row of the recording.
+struct Row {
+    /// Its place among all rows, with those that were put in between.
+    at: usize,
+    /// As measured; NaN where it is not.
+    position: f64,
 }
 
 /// RMS figures of one axis.
@@ -196,16 +222,18 @@ fn write_rows(out: &mut impl Write, time_s: &[f64], axes: &[Predicted<'_>]) -> i
         }
     }
     writeln!(out)?;
-    for (row, time) in time_s.iter().enumerate() {
+    let mut rows: Vec<_> = axes.iter().map(Predicted::rows).collect();
+    for time in time_s {
         write!(out, "{time}")?;
-        for predicted in axes {
-            let (measured, torque) = (predicted.observed.torque[row], predicted.torque[row]);
+        for (predicted, rows) in axes.iter().zip(&mut rows) {
+            let Some(row) = rows.next() else { continue };
+            let (measured, torque) = (predicted.observed.torque[row.at], predicted.torque[row.at]);
             cell(out, measured, None)?;
             cell(out, torque, Some(9))?;
             cell(out, measured - torque, Some(9))?;
-            cell(out, predicted.observed.position[row], None)?;
+            cell(out, row.position, None)?;
             if let Some(position) = &predicted.position {
-                cell(out, position[row], Some(9))?;
+                cell(out, position[row.at], Some(9))?;
             }
         }
         writeln!(out)?;

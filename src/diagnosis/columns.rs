@@ -1,11 +1,11 @@
 //! Takes an axis's columns out of a recording: converted to the drive's units, in stretches of whole, equidistant rows.
 
 use super::frame::Columns;
-use super::stretches::{Stretch, fill_smooth, fill_straight, joined, without_long_holes};
 use crate::analysis::statistics;
 use crate::machine::Axis;
 use crate::plant::observed::Observed;
 use crate::plant::stamps::are_even;
+use crate::plant::stretches::{Stretch, fill_between, fill_smooth, fill_straight, holes, joined, without_long_holes};
 use crate::recording::{Column, IssueKind, Recording, RecordingError, Signal, Unit};
 use std::ops::Range;
 
@@ -149,6 +149,9 @@ impl Columns {
                 fill_straight(&mut apart);
                 apart
             });
+            if let Some(command) = &mut self.command {
+                fill_between(&mut command[s.clone()], &holes(&self.position[s.clone()]), 0.0);
+            }
             fill_smooth(&mut self.position[s.clone()], self.position_grid);
             fill_straight(&mut self.torque[s.clone()]);
             for (row, apart) in s.clone().zip(apart.into_iter().flatten()) {

@@ -15,8 +15,8 @@ use super::many::{decay, product, to_the_power, widest};
 use super::rows::{beside_filled, direction_of, doubtful_rows, judged_rows, resting_rows};
 use super::sampling::{NUMEROV, Sampling};
 use crate::machine::{Axis, Belief, Effect};
+use crate::plant::between::{cubic_at, flattened_at};
 use crate::plant::lateness::Lateness;
-use crate::plant::motion::{cubic_at, flattened_at};
 use std::ops::Range;
 
 /// Plain columns of one axis: what a diagnosis needs of a recording.

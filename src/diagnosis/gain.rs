@@ -5,7 +5,8 @@ use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
 use super::progress::{Stopped, Watch};
 use crate::machine::{Axis, Effect};
-use crate::plant::closed_loop::{ByServo, predict_by};
+use crate::plant::added::ByServo;
+use crate::plant::closed_loop::predict_by;
 use crate::plant::observed::Observed;
 use crate::plant::predict::{TorquePrediction, predict_torque};
 
@@ -34,14 +35,14 @@ fn errors(axis: &Axis, observed: &Observed, servo: &ByServo) -> Option<Errors> {
     Some([
         Some(torque_errors(observed, &prediction.torque)),
         replayed.map(|r| less(&observed.position, &r.position)),
-        replayed.zip(observed.table_position.as_ref()).map(|(r, t)| less(t, &r.table_position)),
+        observed.table_position.as_ref().zip(replayed.and_then(|r| r.table_position.as_ref())).map(|(t, r)| less(t, r)),
     ])
 }
 
 /// Errors of the torque; NaN where the axis stands.
 fn torque_errors(observed: &Observed, prediction: &TorquePrediction) -> Vec<f64> {
     let standing = observed.motion.standing_speed();
-    let rows = observed.torque.iter().zip(&prediction.torque).zip(&observed.motion.velocity);
+    let rows = observed.torque.iter().zip(&prediction.torque).zip(observed.motion.velocities());
     rows.map(|((measured, predicted), v)| if v.abs() > standing { measured - predicted } else { f64::NAN }).collect()
 }
 

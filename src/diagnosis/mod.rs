@@ -35,7 +35,6 @@ mod rows;
 pub mod sampling;
 pub mod select;
 pub mod show;
-mod stretches;
 pub mod uncertainty;
 pub mod verdict;
 

@@ -3,24 +3,24 @@
 //! Starts in the state that the recording shows in its first row; after that nothing measured enters but the command, the torque
 //! that was added to the servo's, where there was such, and which of three differences the control takes for the command's speed.
 
-use super::added::{Added, added, command_speed};
-use super::motion::cubic_at;
+use super::added::{Added, ByServo, Pulses};
+use super::between::cubic_of;
 use super::noise::Noise;
 use super::observed::Observed;
 use super::predict::{TorquePrediction, predict_torque};
 use super::servo::CommandSpeed;
-use super::simulate::{Setup, Start, simulate_physics};
+use super::simulate::{Rows, Setup, Start, simulate_cycles};
 use crate::machine::Axis;
+use std::iter::Peekable;
+use std::ops::Range;
 
 /// A replayed recording, one value a row, load units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClosedLoop {
     /// Motor encoder.
     pub position: Vec<f64>,
-    /// Table, with the errors of the screw.
-    pub table_position: Vec<f64>,
-    /// Drive's own unit.
-    pub torque: Vec<f64>,
+    /// Table, with the errors of the screw; `None` where the recording has none to compare it with.
+    pub table_position: Option<Vec<f64>>,
 }
 
 /// Everything that a machine file says about a recording.
@@ -31,7 +31,7 @@ pub struct Prediction {
     /// The closed loop; `None` without a servo or a recorded command.
     pub closed_loop: Option<ClosedLoop>,
     /// What was added to the servo's torque; the closed loop has it too.
-    pub added: Option<Added>,
+    pub added: Option<Pulses>,
     /// What the control takes for the speed of its command, by the recorded torque.
     pub command_speed: CommandSpeed,
 }
@@ -39,83 +39,95 @@ pub struct Prediction {
 /// Predicts a recording: what `gib predict` writes and what the gain of a diagnosis is measured by.
 ///
 /// # Errors
-/// As [`predict_torque`] and [`replay`].
+/// As [`predict_torque`], and a servo period that does not suit the recording.
 pub fn predict(axis: &Axis, observed: &Observed) -> Result<Prediction, String> {
     predict_by(axis, observed, &ByServo::of(axis, observed))
 }
 
-/// What a recording says of the servo by its law alone: the same of every machine with that drive and servo.
-#[derive(Debug)]
-pub struct ByServo {
-    speed: CommandSpeed,
-    /// What was added to the servo's torque by the usual speed, and by the one that it seems to take where that is another.
-    added: [Option<Added>; 2],
-}
-
-impl ByServo {
-    /// That of a recording.
-    #[must_use]
-    pub fn of(axis: &Axis, observed: &Observed) -> Self {
-        let speed = command_speed(axis, observed);
-        let other = (speed != CommandSpeed::Central).then(|| added(axis, observed, speed)).flatten();
-        Self { speed, added: [added(axis, observed, CommandSpeed::Central), other] }
-    }
+/// The same without the simulated table. The recorded one is dropped once its torque is known: long recordings have no room
+/// for what is not written.
+///
+/// # Errors
+/// As [`predict`].
+pub fn predict_motor(axis: &Axis, observed: &mut Observed) -> Result<Prediction, String> {
+    let torque = predict_torque(axis, observed)?;
+    observed.table_position = None;
+    replayed(axis, observed, torque, &ByServo::of(axis, observed))
 }
 
 /// [`predict`] by what is known of the servo.
 ///
 /// # Errors
-/// As [`predict_torque`] and [`replay`].
+/// As [`predict`].
 pub fn predict_by(axis: &Axis, observed: &Observed, servo: &ByServo) -> Result<Prediction, String> {
-    let mut torque = predict_torque(axis, observed)?;
-    let mut best = Replays::of(axis, observed, &torque, CommandSpeed::Central, servo.added[0].as_ref())?;
-    let speed = servo.speed;
-    if speed != CommandSpeed::Central {
-        let other = Replays::of(axis, observed, &torque, speed, servo.added[1].as_ref())?;
+    replayed(axis, observed, predict_torque(axis, observed)?, servo)
+}
+
+fn replayed(
+    axis: &Axis,
+    observed: &Observed,
+    mut torque: TorquePrediction,
+    servo: &ByServo,
+) -> Result<Prediction, String> {
+    let rest = rows_at_rest(observed);
+    let replay = |speed, added| Replay::felt(axis, observed, &torque, &rest, speed, added);
+    let mut best = replay(CommandSpeed::Central, servo.added[0].as_ref())?;
+    if servo.speed != CommandSpeed::Central {
+        let other = replay(servo.speed, servo.added[1].as_ref())?;
         // A servo that is another one in truth may seem to take another speed, and does not repeat the position by it.
-        if other.error(observed) < best.error(observed) {
-            best = other;
+        if let (Some(of_other), Some(of_best)) = (&other, &best) {
+            if of_other.error(observed) < of_best.error(observed) {
+                best = other;
+            }
         }
     }
-    let Replays { command_speed, alone, given } = best;
-    if let Some(replayed) = &alone {
-        fill_rest(&mut torque, observed, replayed);
+    let Some(Replay { command_speed, replayed, torque_at_rest, added }) = best else {
+        let command_speed = CommandSpeed::Central;
+        return Ok(Prediction { torque, closed_loop: None, added: None, command_speed });
+    };
+    for (row, at_rest) in rest.into_iter().flatten().zip(torque_at_rest) {
+        torque.torque[row] = at_rest;
     }
-    let (closed_loop, added) = given.map_or((alone, None), |(added, replayed)| (Some(replayed), Some(added)));
-    Ok(Prediction { torque, closed_loop, added, command_speed })
+    Ok(Prediction { torque, closed_loop: Some(replayed), added: added.map(|added| added.pulses), command_speed })
 }
 
 /// A recording replayed at one speed of the command.
-struct Replays {
+struct Replay<'s> {
     command_speed: CommandSpeed,
-    /// By the servo alone.
-    alone: Option<ClosedLoop>,
-    /// With what was added to the servo's torque, where that repeats the position better: what only the torque sensor saw, the
-    /// axis did not feel.
-    given: Option<(Added, ClosedLoop)>,
+    replayed: ClosedLoop,
+    /// In the rows at rest, by the servo alone.
+    torque_at_rest: Vec<f64>,
+    /// What was added to the servo's torque, where that repeats the position better: what only the torque sensor saw, the axis
+    /// did not feel.
+    added: Option<&'s Added>,
 }
 
-impl Replays {
-    fn of(
+impl<'s> Replay<'s> {
+    /// `None` where the axis has no servo or the recording no command.
+    fn felt(
         axis: &Axis,
         observed: &Observed,
         torque: &TorquePrediction,
+        rest: &[Range<usize>],
         command_speed: CommandSpeed,
-        added: Option<&Added>,
-    ) -> Result<Self, String> {
-        let alone = replay(axis, observed, torque, &[], command_speed)?;
-        let mut given = None;
-        if let (Some(alone), Some(added)) = (&alone, added) {
-            let with = replay(axis, observed, torque, &added.torque, command_speed)?;
-            let felt = |with: &ClosedLoop| error_of(observed, with) < error_of(observed, alone);
-            given = with.filter(felt).map(|with| (added.clone(), with));
+        added: Option<&'s Added>,
+    ) -> Result<Option<Self>, String> {
+        let Some((replayed, torque_at_rest)) = replay(axis, observed, torque, rest, &[], command_speed)? else {
+            return Ok(None);
+        };
+        let mut felt = Self { command_speed, replayed, torque_at_rest, added: None };
+        if let Some(added) = added {
+            if let Some((with, _)) = replay(axis, observed, torque, &[], &added.torque, command_speed)? {
+                if error_of(observed, &with) < felt.error(observed) {
+                    felt = Self { replayed: with, added: Some(added), ..felt };
+                }
+            }
         }
-        Ok(Self { command_speed, alone, given })
+        Ok(Some(felt))
     }
 
     fn error(&self, observed: &Observed) -> f64 {
-        let best = self.given.as_ref().map(|(_, replayed)| replayed).or(self.alone.as_ref());
-        best.map_or(f64::INFINITY, |replayed| error_of(observed, replayed))
+        error_of(observed, &self.replayed)
     }
 }
 
@@ -126,7 +138,7 @@ fn error_of(observed: &Observed, replayed: &ClosedLoop) -> f64 {
 }
 
 /// Simulates the recorded command under the axis's servo; `prediction` gives the numbers and the phases of its ripples, `added`
-/// what is added to the servo's torque in each cycle (empty for nothing).
+/// what is added to the servo's torque in each cycle (empty for nothing). Beside the motion the torque in the rows at rest.
 ///
 /// `None` where the axis has no servo or the recording no command.
 ///
@@ -136,9 +148,10 @@ fn replay(
     axis: &Axis,
     observed: &Observed,
     prediction: &TorquePrediction,
+    rest: &[Range<usize>],
     added: &[f64],
     command_speed: CommandSpeed,
-) -> Result<Option<ClosedLoop>, String> {
+) -> Result<Option<(ClosedLoop, Vec<f64>)>, String> {
     let (Some(servo), Some(command)) = (&axis.servo, &observed.command) else { return Ok(None) };
     let time = &observed.time_s;
     let (Some(&begin), Some(&end)) = (time.first(), time.last()) else { return Ok(None) };
@@ -151,73 +164,122 @@ fn replay(
             end - begin
         ));
     }
-    let command = command_of_cycles(time, command, servo.period_s, cycles);
+    let mut command = command_of_cycles(time, command, servo.period_s, cycles).peekable();
     let finite = |value: f64| Some(value).filter(|value| value.is_finite());
-    let at_start = |values: &[f64]| values.first().copied().and_then(finite);
-    let velocity = at_start(&observed.motion.velocity).unwrap_or(0.0);
-    let position = at_start(&observed.position).unwrap_or(command[0]);
+    let velocity = finite(observed.motion.velocity(0)).unwrap_or(0.0);
+    let measured = observed.position.first().copied().and_then(finite);
+    let position = measured.or(command.peek().copied()).unwrap_or(0.0);
     let torque = finite(prediction.at_start).unwrap_or(0.0);
     let start = Start { position, velocity, torque };
     let setup = Setup { start: Some(start), command_speed, ..Setup::default() };
-    let trace = simulate_physics(axis, prediction.physics.clone(), &command, added, &setup, Noise::new(0))?;
     // The rows of a recording made once a servo cycle are the cycles themselves.
-    let rows = |values: Vec<f64>| {
-        let place = |t: &f64| {
-            let exact = (t - begin) / servo.period_s;
-            if (exact - exact.round()).abs() < 0.02 { exact.round() } else { exact }
-        };
-        time.iter().map(|t| cubic_at(&values, place(t))).collect()
+    let place = |row: usize| {
+        let exact = (time[row] - begin) / servo.period_s;
+        if (exact - exact.round()).abs() < 0.02 { exact.round() } else { exact }
     };
-    Ok(Some(ClosedLoop {
-        position: rows(trace.position),
-        table_position: rows(trace.table_position),
-        torque: rows(trace.torque),
-    }))
+    let with_table = observed.table_position.is_some();
+    let mut rows = AtRows {
+        motor: Reader::new(cycles, time.len(), (0..time.len()).map(place)),
+        table: with_table.then(|| Reader::new(cycles, time.len(), (0..time.len()).map(place))),
+        torque: Reader::new(cycles, rest.iter().map(Range::len).sum(), rest.iter().cloned().flatten().map(place)),
+    };
+    let physics = prediction.physics.clone();
+    simulate_cycles(axis, physics, command, added, &setup, &mut Noise::new(0), &mut rows)?;
+    let table_position = rows.table.map(|table| table.values);
+    Ok(Some((ClosedLoop { position: rows.motor.values, table_position }, rows.torque.values)))
 }
 
-/// Takes the torque of rows at rest from the replay.
-///
-/// What dry friction holds at rest is not in the motion: it is what the servo has come to by then, which the replay
-/// knows. At rest means less travel within a period of the motion's cut-off than reversing friction takes.
-fn fill_rest(prediction: &mut TorquePrediction, observed: &Observed, replayed: &ClosedLoop) {
-    let motion = &observed.motion;
-    let slow = 10.0 * motion.resolution * motion.cutoff_hz;
-    let around = (0.5 / (motion.cutoff_hz * observed.period_s)).ceil() as usize;
-    // Rows in a row that are slow, up to and with this one.
-    let mut length = 0;
-    for i in 0..motion.velocity.len() {
-        length = if motion.velocity[i].abs() < slow { length + 1 } else { 0 };
-        if length > 2 * around {
-            prediction.torque[i - around] = replayed.torque[i - around];
+/// What a simulation gives, at the rows of a recording.
+struct AtRows<M: Iterator<Item = f64>, T: Iterator<Item = f64>> {
+    motor: Reader<M>,
+    table: Option<Reader<M>>,
+    torque: Reader<T>,
+}
+
+impl<M: Iterator<Item = f64>, T: Iterator<Item = f64>> Rows for AtRows<M, T> {
+    fn positions(&mut self, motor: f64, table: f64) {
+        self.motor.add(motor);
+        if let Some(reader) = &mut self.table {
+            reader.add(table);
+        }
+    }
+
+    fn torque(&mut self, torque: f64) {
+        self.torque.add(torque);
+    }
+}
+
+/// Reads a series of so many cycles, which comes one after the other, at places between them that rise.
+struct Reader<P: Iterator<Item = f64>> {
+    cycles: usize,
+    places: Peekable<P>,
+    came: usize,
+    /// The last cycles, each at its remainder: a cubic takes four.
+    last: [f64; 4],
+    values: Vec<f64>,
+}
+
+impl<P: Iterator<Item = f64>> Reader<P> {
+    fn new(cycles: usize, count: usize, places: P) -> Self {
+        let values = Vec::with_capacity(count);
+        Self { cycles, places: places.peekable(), came: 0, last: [0.0; 4], values }
+    }
+
+    fn add(&mut self, value: f64) {
+        self.last[self.came % 4] = value;
+        self.came += 1;
+        while let Some(place) = self.places.next_if(|place| self.came >= self.cycles.min(*place as usize + 3)) {
+            self.values.push(cubic_of(self.cycles, |k| self.last[k % 4], place));
         }
     }
 }
 
+/// Rows at rest, whose torque is that of the replay.
+///
+/// What dry friction holds at rest is not in the motion: it is what the servo has come to by then, which the replay
+/// knows. At rest means less travel within a period of the motion's cut-off than reversing friction takes.
+fn rows_at_rest(observed: &Observed) -> Vec<Range<usize>> {
+    let motion = &observed.motion;
+    let slow = 10.0 * motion.resolution * motion.cutoff_hz;
+    let around = (0.5 / (motion.cutoff_hz * observed.period_s)).ceil() as usize;
+    let mut rest: Vec<Range<usize>> = Vec::new();
+    // Rows in a row that are slow, up to and with this one.
+    let mut length = 0;
+    for (i, v) in motion.velocities().enumerate() {
+        length = if v.abs() < slow { length + 1 } else { 0 };
+        if length > 2 * around {
+            let row = i - around;
+            match rest.last_mut() {
+                Some(last) if last.end == row => last.end = row + 1,
+                _ => rest.push(row..row + 1),
+            }
+        }
+    }
+    rest
+}
+
 /// The command at the start of each servo cycle: interpolated between rows, held over rows without one.
-#[must_use]
-pub fn command_of_cycles(time_s: &[f64], command: &[f64], period: f64, cycles: usize) -> Vec<f64> {
+pub fn command_of_cycles(time_s: &[f64], command: &[f64], period: f64, cycles: usize) -> impl Iterator<Item = f64> {
     let known = time_s.iter().zip(command).filter(|(_, x)| x.is_finite());
     let mut rows = known.map(|(t, x)| (t - time_s[0], *x));
-    let Some((mut now, first)) = rows.next().map(|row| (row, row.1)) else { return vec![0.0; cycles] };
-    let mut next = rows.next();
-    (0..cycles)
-        .map(|cycle| {
-            let t = cycle as f64 * period;
-            while let Some(row) = next.filter(|row| row.0 <= t + 1e-3 * period) {
-                (now, next) = (row, rows.next());
-            }
-            let (t0, x0) = now;
-            // Times are written rounded: a thousandth of a cycle is none.
-            if (t - t0).abs() <= 1e-3 * period {
-                return x0;
-            }
-            match next {
-                Some((t1, x1)) if t >= t0 => x0 + (x1 - x0) * (t - t0) / (t1 - t0),
-                Some(_) => first,
-                None => x0,
-            }
-        })
-        .collect()
+    let first = rows.next();
+    let (mut now, mut next) = (first, rows.next());
+    (0..cycles).map(move |cycle| {
+        let t = cycle as f64 * period;
+        while let Some(row) = next.filter(|row| row.0 <= t + 1e-3 * period) {
+            (now, next) = (Some(row), rows.next());
+        }
+        let (Some((_, x_first)), Some((t0, x0))) = (first, now) else { return 0.0 };
+        // Times are written rounded: a thousandth of a cycle is none.
+        if (t - t0).abs() <= 1e-3 * period {
+            return x0;
+        }
+        match next {
+            Some((t1, x1)) if t >= t0 => x0 + (x1 - x0) * (t - t0) / (t1 - t0),
+            Some(_) => x_first,
+            None => x0,
+        }
+    })
 }
 
 #[cfg(test)]
@@ -228,9 +290,9 @@ mod tests {
     fn the_command_of_a_cycle_is_that_of_its_row() {
         let time: Vec<f64> = (0..100).map(|i| f64::from(i) * 1e-3).collect();
         let command: Vec<f64> = time.iter().map(|t| t * t).collect();
-        assert_eq!(command_of_cycles(&time, &command, 1e-3, 100), command);
+        assert!(command_of_cycles(&time, &command, 1e-3, 100).eq(command.iter().copied()));
         // Four cycles a row: between the rows a straight line.
-        let fine = command_of_cycles(&time, &command, 0.25e-3, 397);
+        let fine: Vec<f64> = command_of_cycles(&time, &command, 0.25e-3, 397).collect();
         assert_eq!(fine.len(), 397);
         for (cycle, x) in fine.iter().enumerate() {
             let t = cycle as f64 * 0.25e-3;
@@ -241,6 +303,7 @@ mod tests {
     #[test]
     fn a_row_without_a_command_is_bridged() {
         let time = [0.0, 1.0, 2.0, 3.0];
-        assert_eq!(command_of_cycles(&time, &[f64::NAN, 1.0, f64::NAN, 3.0], 1.0, 4), [1.0, 1.0, 2.0, 3.0]);
+        let command = [f64::NAN, 1.0, f64::NAN, 3.0];
+        assert!(command_of_cycles(&time, &command, 1.0, 4).eq([1.0, 1.0, 2.0, 3.0]));
     }
 }

@@ -2,6 +2,8 @@
 
 pub mod added;
 pub mod axis;
+pub mod between;
+pub mod bridges;
 pub mod closed_loop;
 pub mod coupling;
 pub mod friction;
@@ -17,3 +19,4 @@ pub mod predict;
 pub mod servo;
 pub mod simulate;
 pub mod stamps;
+pub mod stretches;

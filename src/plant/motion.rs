@@ -6,6 +6,7 @@
 //! frequency at which motion and noise are equal. (Wiener 1949; Gustafsson, *Determining the initial states in
 //! forward-backward filtering*, 1996.)
 
+use super::between::cubic_at;
 use super::linear::rms;
 use super::stamps::are_even;
 use realfft::RealFftPlanner;
@@ -16,27 +17,85 @@ use std::ops::Range;
 /// Motion of one axis at the rows of its recording, in load units (mm; degree for rotary).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
-    /// Position with the noise above the cut-off taken off.
+    /// Position with the noise above the cut-off taken off; NaN in rows outside the stretches.
     pub position: Vec<f64>,
-    /// Per second.
-    pub velocity: Vec<f64>,
-    /// Per second squared.
-    pub acceleration: Vec<f64>,
     /// Where motion and noise are equal, Hz.
     pub cutoff_hz: f64,
     /// RMS of what was taken off: what the position cannot tell.
     pub resolution: f64,
+    pieces: Vec<Piece>,
+}
+
+/// A stretch of rows, and how its speed and acceleration are had.
+#[derive(Debug, Clone, PartialEq)]
+struct Piece {
+    rows: Range<usize>,
+    slopes: Slopes,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Slopes {
+    /// Rows are even: both are differences of the position, which goes on so before and after them. Long recordings have no room
+    /// for more.
+    Even { period: f64, before: [f64; 2], after: [f64; 2] },
+    /// Read off between the rows of an even grid.
+    Uneven { velocity: Vec<f64>, acceleration: Vec<f64> },
 }
 
 /// Fewest rows from which an acceleration is estimated.
 pub const FEWEST_ROWS: usize = 16;
 
 impl Motion {
+    /// Speed at a row, per second; NaN outside the stretches.
+    #[inline]
+    #[must_use]
+    pub fn velocity(&self, row: usize) -> f64 {
+        self.slope(row, first_derivative, |velocity, _| velocity)
+    }
+
+    /// Acceleration at a row, per second squared; NaN outside the stretches.
+    #[inline]
+    #[must_use]
+    pub fn acceleration(&self, row: usize) -> f64 {
+        self.slope(row, second_derivative, |_, acceleration| acceleration)
+    }
+
+    /// The speed at each row.
+    pub fn velocities(&self) -> impl Iterator<Item = f64> {
+        (0..self.position.len()).map(|row| self.velocity(row))
+    }
+
+    #[inline]
+    fn slope(
+        &self,
+        row: usize,
+        of_neighbours: fn([f64; 5], f64) -> f64,
+        of_stored: for<'v> fn(&'v [f64], &'v [f64]) -> &'v [f64],
+    ) -> f64 {
+        let Some(piece) = self.pieces.get(self.pieces.partition_point(|piece| piece.rows.end <= row)) else {
+            return f64::NAN;
+        };
+        let Some(place) = row.checked_sub(piece.rows.start) else { return f64::NAN };
+        let (period, before, after) = match &piece.slopes {
+            Slopes::Even { period, before, after } => (period, before, after),
+            Slopes::Uneven { velocity, acceleration } => return of_stored(velocity, acceleration)[place],
+        };
+        let x = &self.position[piece.rows.clone()];
+        let neighbours = match x.get(place.wrapping_sub(2)..place + 3) {
+            Some(&[a, b, c, d, e]) => [a, b, c, d, e],
+            _ => [0, 1, 2, 3, 4].map(|k| match (place + k).checked_sub(2) {
+                None => before[place + k],
+                Some(at) => x.get(at).copied().unwrap_or_else(|| after[at - x.len()]),
+            }),
+        };
+        of_neighbours(neighbours, *period)
+    }
+
     /// Speed below which an axis cannot be told from one that stands, load units/s: thrice what the position leaves open, at
     /// the fastest it is known, and never nothing. Dry friction at rest is not a function of the motion.
     #[must_use]
     pub fn standing_speed(&self) -> f64 {
-        let typical = rms(self.velocity.iter().copied().filter(|v| v.is_finite()));
+        let typical = rms(self.velocities().filter(|v| v.is_finite()));
         (3.0 * std::f64::consts::TAU * self.cutoff_hz * self.resolution).max(1e-6 * typical)
     }
 
@@ -57,9 +116,8 @@ impl Motion {
         let cutoff_hz = noise_crossing_hz(&pieces, period_s);
         // A motion of all rows is taken as it is: long recordings have no room for a copy.
         let whole = longest.len() == position.len();
-        let nothing = || if whole { Vec::new() } else { vec![f64::NAN; position.len()] };
-        let mut motion =
-            Motion { position: nothing(), velocity: nothing(), acceleration: nothing(), cutoff_hz, resolution: 0.0 };
+        let nothing = if whole { Vec::new() } else { vec![f64::NAN; position.len()] };
+        let mut motion = Motion { position: nothing, cutoff_hz, resolution: 0.0, pieces: Vec::new() };
         let (mut square, mut rows) = (0.0, 0);
         for s in stretches {
             let Some(part) = Self::with_cutoff(&time_s[s.clone()], &position[s.clone()], Some(cutoff_hz)) else {
@@ -67,13 +125,11 @@ impl Motion {
             };
             square += part.resolution * part.resolution * s.len() as f64;
             rows += s.len();
+            motion.pieces.extend(part.pieces.into_iter().map(|piece| Piece { rows: s.clone(), ..piece }));
             if whole {
-                (motion.position, motion.velocity, motion.acceleration) =
-                    (part.position, part.velocity, part.acceleration);
+                motion.position = part.position;
             } else {
                 motion.position[s.clone()].copy_from_slice(&part.position);
-                motion.velocity[s.clone()].copy_from_slice(&part.velocity);
-                motion.acceleration[s.clone()].copy_from_slice(&part.acceleration);
             }
         }
         motion.resolution = (square / rows.max(1) as f64).sqrt();
@@ -92,14 +148,37 @@ impl Motion {
         let regular = are_even(time_s, 0.02);
         let grid = if regular { Cow::Borrowed(position) } else { Cow::Owned(resample(time_s, position, period)) };
         let cutoff_hz = cutoff_hz.unwrap_or_else(|| noise_crossing_hz(&[&grid], period)).min(0.4 / period);
-        let [smooth, velocity, acceleration] = differentiate(&grid, period, cutoff_hz);
-        let back = |values: Vec<f64>| {
-            if regular { values } else { time_s.iter().map(|t| cubic_at(&values, (t - start) / period)).collect() }
+        let (mut x, pad) = low_passed(grid.into_owned(), period, cutoff_hz);
+        let (smooth, slopes) = if regular {
+            let (before, after) = ([x[pad - 2], x[pad - 1]], [x[pad + n], x[pad + n + 1]]);
+            x.truncate(pad + n);
+            x.drain(..pad);
+            (x, Slopes::Even { period, before, after })
+        } else {
+            let of = |derivative: fn([f64; 5], f64) -> f64| -> Vec<f64> {
+                let on_grid: Vec<f64> = x[pad - 2..pad + n + 2]
+                    .windows(5)
+                    .map(|x| derivative([x[0], x[1], x[2], x[3], x[4]], period))
+                    .collect();
+                time_s.iter().map(|t| cubic_at(&on_grid, (t - start) / period)).collect()
+            };
+            (of(|x, _| x[2]), Slopes::Uneven { velocity: of(first_derivative), acceleration: of(second_derivative) })
         };
-        let (smooth, velocity, acceleration) = (back(smooth), back(velocity), back(acceleration));
         let square: f64 = position.iter().zip(&smooth).map(|(raw, s)| (raw - s) * (raw - s)).sum();
-        Some(Motion { position: smooth, velocity, acceleration, cutoff_hz, resolution: (square / n as f64).sqrt() })
+        let pieces = vec![Piece { rows: 0..n, slopes }];
+        Some(Motion { position: smooth, cutoff_hz, resolution: (square / n as f64).sqrt(), pieces })
     }
+}
+
+/// Central differences of fourth order.
+#[inline]
+fn first_derivative(x: [f64; 5], period: f64) -> f64 {
+    (8.0 * (x[3] - x[1]) - (x[4] - x[0])) / (12.0 * period)
+}
+
+#[inline]
+fn second_derivative(x: [f64; 5], period: f64) -> f64 {
+    (16.0 * (x[3] + x[1]) - (x[4] + x[0]) - 30.0 * x[2]) / (12.0 * period * period)
 }
 
 /// Linear interpolation onto a regular grid of as many rows over the same time.
@@ -117,25 +196,6 @@ fn resample(time_s: &[f64], values: &[f64], period: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Value of a regular series at a fractional index, by Catmull and Rom's cubic; held at the ends.
-#[must_use]
-pub fn cubic_at(values: &[f64], index: f64) -> f64 {
-    let last = values.len().saturating_sub(1);
-    let index = index.clamp(0.0, last as f64);
-    let i = (index as usize).min(last.saturating_sub(1));
-    let at = |k: usize| values.get(k.min(last)).copied().unwrap_or(0.0);
-    let (a, b, c, d) = (at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2));
-    let t = index - i as f64;
-    b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
-}
-
-/// The same with this share of the second difference there added: flattened where positive, raised where negative.
-#[must_use]
-pub fn flattened_at(values: &[f64], index: f64, share: f64) -> f64 {
-    let at = |k: f64| cubic_at(values, index + k);
-    if share == 0.0 { at(0.0) } else { at(0.0) + share * (at(-1.0) - 2.0 * at(0.0) + at(1.0)) }
-}
-
 /// The share of a sine that a zero-phase cut-off leaves: a Butterworth filter of fourth order there and back.
 #[must_use]
 pub fn passed(hz: f64, cutoff_hz: f64) -> f64 {
@@ -144,30 +204,19 @@ pub fn passed(hz: f64, cutoff_hz: f64) -> f64 {
 
 /// A regular series without what lies above a cut-off, unshifted: the band in which a [`Motion`] is known.
 #[must_use]
-pub fn smoothed(values: &[f64], period: f64, cutoff_hz: f64) -> Vec<f64> {
-    if values.len() < FEWEST_ROWS {
-        return values.to_vec();
+pub fn smoothed(values: Vec<f64>, period: f64, cutoff_hz: f64) -> Vec<f64> {
+    let n = values.len();
+    if n < FEWEST_ROWS {
+        return values;
     }
     let (mut x, pad) = low_passed(values, period, cutoff_hz);
-    x.truncate(pad + values.len());
+    x.truncate(pad + n);
     x.drain(..pad);
     x
 }
 
-/// Smoothed series and its first two derivatives.
-fn differentiate(values: &[f64], period: f64, cutoff_hz: f64) -> [Vec<f64>; 3] {
-    let n = values.len();
-    let (x, pad) = low_passed(values, period, cutoff_hz);
-    let at = |i: usize, k: isize| x[(i + pad).saturating_add_signed(k)];
-    // Central differences of fourth order; the padding gives them neighbours at both ends.
-    let first = |i| (8.0 * (at(i, 1) - at(i, -1)) - (at(i, 2) - at(i, -2))) / (12.0 * period);
-    let second =
-        |i| (16.0 * (at(i, 1) + at(i, -1)) - (at(i, 2) + at(i, -2)) - 30.0 * at(i, 0)) / (12.0 * period * period);
-    [(0..n).map(|i| at(i, 0)).collect(), (0..n).map(first).collect(), (0..n).map(second).collect()]
-}
-
 /// Smoothed series with some rows before and after it, and how many there are before it.
-fn low_passed(values: &[f64], period: f64, cutoff_hz: f64) -> (Vec<f64>, usize) {
+fn low_passed(values: Vec<f64>, period: f64, cutoff_hz: f64) -> (Vec<f64>, usize) {
     let n = values.len();
     // Six periods of the cut-off: the filter has forgotten its start by then.
     let pad = ((6.0 / (cutoff_hz * period)) as usize).clamp(4, n - 1);
@@ -178,10 +227,12 @@ fn low_passed(values: &[f64], period: f64, cutoff_hz: f64) -> (Vec<f64>, usize) 
     let turned: Vec<f64> = values[n - window..].iter().rev().copied().collect();
     let tail = parabola(&turned);
     let beyond = |(value, bend): (f64, f64), k: usize, mirror: f64| 2.0 * value - mirror + bend * (k * k) as f64;
-    let before = (1..=pad).rev().map(|k| beyond(head, k, values[k]));
-    let after = (1..=pad).map(|k| beyond(tail, k, values[n - 1 - k]));
-    let mut x = Vec::with_capacity(n + 2 * pad);
-    x.extend(before.chain(values.iter().copied()).chain(after));
+    let before: Vec<f64> = (1..=pad).rev().map(|k| beyond(head, k, values[k])).collect();
+    let after: Vec<f64> = (1..=pad).map(|k| beyond(tail, k, values[n - 1 - k])).collect();
+    let mut x = values;
+    x.reserve_exact(2 * pad);
+    x.extend(after);
+    x.splice(0..0, before);
     for section in Section::butterworth4(cutoff_hz * period) {
         section.run(&mut x);
         x.reverse();
@@ -310,8 +361,8 @@ mod tests {
         let w = TAU * hz;
         for i in 300..3700 {
             let t = time[i];
-            assert!((motion.velocity[i] / (50.0 * w) - (w * t).cos()).abs() < 1e-4);
-            assert!((motion.acceleration[i] / (50.0 * w * w) + (w * t).sin()).abs() < 1e-4);
+            assert!((motion.velocity(i) / (50.0 * w) - (w * t).cos()).abs() < 1e-4);
+            assert!((motion.acceleration(i) / (50.0 * w * w) + (w * t).sin()).abs() < 1e-4);
         }
     }
 
@@ -320,7 +371,8 @@ mod tests {
         let time: Vec<f64> = (0..2000).map(|i| f64::from(i) * 1e-3).collect();
         let position: Vec<f64> = time.iter().map(|t| 7.0 - 30.0 * t + 400.0 * t * t).collect();
         let motion = Motion::with_cutoff(&time, &position, Some(60.0)).unwrap();
-        for (t, (v, a)) in time.iter().zip(motion.velocity.iter().zip(&motion.acceleration)) {
+        for (row, t) in time.iter().enumerate() {
+            let (v, a) = (motion.velocity(row), motion.acceleration(row));
             assert!((v - (800.0 * t - 30.0)).abs() < 0.5 && (a - 800.0).abs() < 8.0, "{t}: {v}, {a}");
         }
     }
@@ -341,7 +393,7 @@ mod tests {
         let position: Vec<f64> = time.iter().map(|t| 10.0 * (TAU * 1.5 * t).sin()).collect();
         let motion = Motion::with_cutoff(&time, &position, Some(30.0)).unwrap();
         let w = TAU * 1.5;
-        let error = rms((400..4600).map(|i| motion.acceleration[i] + 10.0 * w * w * (w * time[i]).sin()));
+        let error = rms((400..4600).map(|i| motion.acceleration(i) + 10.0 * w * w * (w * time[i]).sin()));
         assert!(error < 0.01 * 10.0 * w * w, "{error}");
     }
 
@@ -367,7 +419,7 @@ mod tests {
             let noisy: Vec<f64> = clean.iter().zip(noise(20_000)).map(|(x, e)| x + sigma * e).collect();
             let error = |cutoff| {
                 let motion = Motion::with_cutoff(&time, &noisy, cutoff).unwrap();
-                rms((1000..19_000).map(|i| motion.acceleration[i] - truth[i]))
+                rms((1000..19_000).map(|i| motion.acceleration(i) - truth[i]))
             };
             let best = (0..40).map(|k| error(Some(2.0 * 1.13_f64.powi(k)))).fold(f64::INFINITY, f64::min);
             let found = error(None);

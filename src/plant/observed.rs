@@ -1,17 +1,21 @@
 //! One axis of a recording in the units of the model, with its motion worked out once.
+//!
+//! Where few rows are lost the motion goes on, and so does what is simulated along it: such rows are put in between.
 
+use super::bridges::{Bridges, Filled};
 use super::motion::{FEWEST_ROWS, Motion};
 use super::stamps::times_of_rows;
 use crate::machine::Axis;
 use crate::recording::{Recording, RecordingError, Signal, Unit};
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// What a recording shows of one axis. All columns have one value a row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observed {
     /// When the rows were taken, s: as recorded, or evenly where the motion says so ([`times_of_rows`]).
-    pub time_s: Vec<f64>,
+    pub time_s: Arc<Vec<f64>>,
     /// Mean time between rows, s.
     pub period_s: f64,
     /// Load units (mm; degree for rotary).
@@ -26,6 +30,8 @@ pub struct Observed {
     pub runs: Vec<Range<usize>>,
     /// Motion of those stretches; NaN in rows outside them.
     pub motion: Motion,
+    /// Rows whose position is filled in by those beside them, in order.
+    pub filled: Vec<Filled>,
 }
 
 impl Observed {
@@ -59,18 +65,23 @@ impl Observed {
         let optional = |signal| recording.get(&axis.name, signal).map(|_| factor(signal, load_unit)).transpose();
         let (position, torque) = (factor(Signal::Position, load_unit)?, factor(torque_signal, torque_unit)?);
         let (command, table) = (optional(Signal::PositionCommand)?, optional(Signal::TablePosition)?);
-        let runs = recording.runs(&[recording.column(&axis.name, Signal::Position)?]);
+        let encoder = recording.column(&axis.name, Signal::Position)?;
+        let bridges = Bridges::over(recording, encoder);
         let mut take = |signal: Signal, factor: f64| {
             let mut values = recording.take(&axis.name, signal).map_or_else(Vec::new, |column| column.values);
             if factor != 1.0 {
                 values.iter_mut().for_each(|value| *value *= factor);
             }
+            bridges.make_room(&mut values);
             values
         };
-        let (position, torque) = (take(Signal::Position, position), take(torque_signal, torque));
-        let command = command.map(|factor| take(Signal::PositionCommand, factor));
-        let table_position = table.map(|factor| take(Signal::TablePosition, factor));
-        let observed = Self::from_columns(recording.time_s.clone(), position, torque, command, table_position, runs);
+        let (mut position, torque) = (take(Signal::Position, position), take(torque_signal, torque));
+        let mut command = command.map(|factor| take(Signal::PositionCommand, factor));
+        let mut table = table.map(|factor| take(Signal::TablePosition, factor));
+        bridges.fill_in(&mut position, command.as_mut(), table.as_mut(), recording.sampling.period_s);
+        let Bridges { runs, filled, time_s, .. } = bridges;
+        let observed = Self::from_columns(time_s, position, torque, command, table, runs);
+        let observed = observed.map(|observed| Self { filled, ..observed });
         observed.ok_or_else(|| {
             let message = format!(
                 "axis {} has no {FEWEST_ROWS} rows in a row without gap, jump or empty cell in its position",
@@ -83,22 +94,35 @@ impl Observed {
     /// The same from columns in the units of the model; `None` when no run is long enough.
     #[must_use]
     pub fn from_columns(
-        mut time_s: Vec<f64>,
+        time_s: impl Into<Arc<Vec<f64>>>,
         position: Vec<f64>,
         torque: Vec<f64>,
         command: Option<Vec<f64>>,
         table_position: Option<Vec<f64>>,
         mut runs: Vec<Range<usize>>,
     ) -> Option<Observed> {
+        let mut time_s = time_s.into();
         runs.retain(|run| run.len() >= FEWEST_ROWS && run.end <= position.len());
         for run in &runs {
             if let Cow::Owned(even) = times_of_rows(&time_s[run.clone()], &position[run.clone()]) {
-                time_s[run.clone()].copy_from_slice(&even);
+                Arc::make_mut(&mut time_s)[run.clone()].copy_from_slice(&even);
             }
         }
         let longest = runs.iter().max_by_key(|run| run.len())?.clone();
         let period_s = (time_s[longest.end - 1] - time_s[longest.start]) / (longest.len() - 1) as f64;
         let motion = Motion::of_stretches(&time_s, &position, &runs)?;
-        Some(Observed { time_s, period_s, position, torque, command, table_position, runs, motion })
+        Some(Observed { time_s, period_s, position, torque, command, table_position, runs, motion, filled: Vec::new() })
+    }
+
+    /// The rows that stand in the recording, in order, and whether their position does.
+    pub fn recorded(&self) -> impl Iterator<Item = (usize, bool)> {
+        let mut filled = self.filled.iter().peekable();
+        (0..self.position.len()).filter_map(move |row| {
+            while filled.next_if(|filled| filled.rows.end <= row).is_some() {}
+            match filled.peek().filter(|filled| filled.rows.contains(&row)) {
+                Some(filled) => filled.recorded.then_some((row, false)),
+                None => Some((row, true)),
+            }
+        })
     }
 }

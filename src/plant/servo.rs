@@ -31,16 +31,27 @@ impl CommandSpeed {
         }
     }
 
-    /// Travel per cycle of a command at a cycle; at the ends that of the one neighbour there is.
+    /// Travel per cycle of a command between its neighbours; at the ends that of the one neighbour there is.
     #[must_use]
-    pub fn of(self, command: &[f64], cycle: usize) -> f64 {
-        let (before, after) = (cycle.saturating_sub(1), (cycle + 1).min(command.len() - 1));
-        let (from, to) = match self {
-            CommandSpeed::Backward if before < cycle => (before, cycle),
-            CommandSpeed::Forward if cycle < after => (cycle, after),
-            _ => (before, after),
-        };
-        if to == from { 0.0 } else { (command[to] - command[from]) / (to - from) as f64 }
+    fn travel(self, before: Option<f64>, now: f64, after: Option<f64>) -> f64 {
+        match (self, before, after) {
+            (CommandSpeed::Central, Some(before), Some(after)) => (after - before) / 2.0,
+            (CommandSpeed::Forward, _, Some(after)) | (_, None, Some(after)) => after - now,
+            (_, Some(before), _) => now - before,
+            (_, None, None) => 0.0,
+        }
+    }
+
+    /// The positions of a command, each with its travel per cycle.
+    pub fn along(self, mut command: impl Iterator<Item = f64>) -> impl Iterator<Item = (f64, f64)> {
+        let (mut before, mut next) = (None, command.next());
+        std::iter::from_fn(move || {
+            let now = next?;
+            next = command.next();
+            let travel = self.travel(before, now, next);
+            before = Some(now);
+            Some((now, travel))
+        })
     }
 }
 
@@ -120,11 +131,11 @@ mod tests {
     #[test]
     fn the_speed_of_a_command_is_that_of_its_neighbours() {
         let command = [0.0, 1.0, 4.0, 9.0];
-        let speeds = |kind: CommandSpeed| [0, 1, 2, 3].map(|cycle| kind.of(&command, cycle));
+        let speeds = |kind: CommandSpeed| kind.along(command.into_iter()).map(|(_, speed)| speed).collect::<Vec<_>>();
         assert_eq!(speeds(CommandSpeed::Central), [1.0, 2.0, 4.0, 5.0]);
         assert_eq!(speeds(CommandSpeed::Backward), [1.0, 1.0, 3.0, 5.0]);
         assert_eq!(speeds(CommandSpeed::Forward), [1.0, 3.0, 5.0, 5.0]);
-        assert!(CommandSpeed::ALL.into_iter().all(|kind| kind.of(&[7.0], 0) == 0.0));
+        assert!(CommandSpeed::ALL.into_iter().all(|kind| kind.along([7.0].into_iter()).eq([(7.0, 0.0)])));
     }
 
     #[test]

@@ -10,6 +10,7 @@ use super::noise::Noise;
 use super::physics::{Physics, Ripple};
 use super::servo::{CommandSpeed, ServoLoop};
 use crate::machine::{Axis, Drive, Servo};
+use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 /// Sensors of the recording. All zero: ideal ones. The servo reads the same encoder as the row.
@@ -93,37 +94,63 @@ pub fn simulate(axis: &Axis, command: &[f64], setup: &Setup) -> Result<Trace, St
     let mut noise = Noise::new(setup.seed);
     let ripples = physics.cogging.iter_mut().chain(&mut physics.vibration).chain(&mut physics.table_error);
     ripples.for_each(|ripple| ripple.phase = TAU * noise.uniform());
-    let trace = simulate_physics(axis, physics, command, &[], setup, noise)?;
-    let period_s = axis.servo.map_or(0.0, |servo| servo.period_s);
-    let time_s = (0..command.len()).map(|cycle| cycle as f64 * period_s).collect();
-    Ok(Trace { time_s, command: command.to_vec(), ..trace })
-}
-
-/// The same with phases given, and with torque that is added to the servo's in each cycle (empty for none); times and command
-/// are left out, since long recordings have no room for what is known.
-///
-/// # Errors
-/// As [`simulate`].
-pub fn simulate_physics(
-    axis: &Axis,
-    physics: Physics,
-    command: &[f64],
-    added: &[f64],
-    setup: &Setup,
-    mut noise: Noise,
-) -> Result<Trace, String> {
-    let servo =
-        axis.servo.ok_or("the machine file gives this axis no servo, so that no closed loop can be simulated")?;
-    let Some(&first) = command.first() else { return Ok(Trace::default()) };
     if let Some(row) = command.iter().position(|x| !x.is_finite()) {
         return Err(format!("the command of cycle {row} is not a finite number"));
     }
+    let room = || Vec::with_capacity(command.len());
+    let mut trace = Trace { position: room(), table_position: room(), torque: room(), ..Trace::default() };
+    simulate_cycles(axis, physics, command.iter().copied(), &[], setup, &mut noise, &mut trace)?;
+    let Sensors { torque_noise, torque_grid, .. } = setup.sensors;
+    trace.torque.iter_mut().for_each(|torque| *torque = on_grid(*torque + noise.normal(torque_noise), torque_grid));
+    let period_s = axis.servo.map_or(0.0, |servo| servo.period_s);
+    trace.time_s = (0..command.len()).map(|cycle| cycle as f64 * period_s).collect();
+    trace.command = command.to_vec();
+    Ok(trace)
+}
+
+/// Who takes what a simulation gives: long ones have no room for what is not needed.
+pub trait Rows {
+    /// What encoder and scale read at the start of the next cycle.
+    fn positions(&mut self, motor: f64, table: f64);
+    /// What the log says of the torque, for one cycle after the other; some cycles later than the positions where it is early.
+    fn torque(&mut self, torque: f64);
+}
+
+impl Rows for Trace {
+    fn positions(&mut self, motor: f64, table: f64) {
+        self.position.push(motor);
+        self.table_position.push(table);
+    }
+
+    fn torque(&mut self, torque: f64) {
+        self.torque.push(torque);
+    }
+}
+
+/// The same with phases given, and with torque that is added to the servo's in each cycle (empty for none), of a command that is
+/// finite; the torque has neither noise nor grid.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_cycles(
+    axis: &Axis,
+    physics: Physics,
+    command: impl Iterator<Item = f64>,
+    added: &[f64],
+    setup: &Setup,
+    noise: &mut Noise,
+    rows: &mut impl Rows,
+) -> Result<(), String> {
+    let servo =
+        axis.servo.ok_or("the machine file gives this axis no servo, so that no closed loop can be simulated")?;
+    let mut command = command.peekable();
+    let Some(&first) = command.peek() else { return Ok(()) };
     let steps = steps_per_cycle(&physics, &servo, setup.step_s)?;
     let step_s = servo.period_s / steps as f64;
     let start = setup.start.unwrap_or(Start { position: first, velocity: 0.0, torque: physics.load(first, 0.0, 0.0) });
     let scale = physics.motor_per_load;
     let encoder = Encoder::new(axis.drive, &setup.sensors)?;
-    let log = TorqueLog { servo, delay_s: physics.delay_s, start: start.torque };
+    let mut log = TorqueLog::new(servo, physics.delay_s, start.torque);
     let table = physics.clone();
     let (position, velocity) = (start.position * scale, start.velocity * scale);
     let mut body = Body::new(physics, step_s, servo.torque_time_constant_s, position, velocity, start.torque);
@@ -133,31 +160,26 @@ pub fn simulate_physics(
     let age = (setup.sensors.delay_s / step_s).round() as usize;
     let (late, fine) = (age.div_ceil(steps), (steps - age % steps) % steps);
     let mut seen = vec![(body.motor_position(), body.table_position()); late];
-    let room = || Vec::with_capacity(command.len());
-    let mut trace = Trace { position: room(), table_position: room(), ..Trace::default() };
-    let mut torques = Vec::with_capacity(command.len());
-    for (cycle, &target) in command.iter().enumerate() {
+    for (cycle, (target, travel)) in setup.command_speed.along(command).enumerate() {
         let now = (body.motor_position(), body.table_position());
         let (motor, table_motor) = if late == 0 { now } else { seen[cycle % late] };
-        let read = encoder.read(motor / scale, &mut noise);
-        trace.position.push(read);
-        trace.table_position.push(encoder.digitise(table.table_of(table_motor / scale), &mut noise));
-        let speed = setup.command_speed.of(command, cycle) / servo.period_s;
-        let own = control.cycle(target * scale, speed * scale, read * scale);
+        let read = encoder.read(motor / scale, noise);
+        rows.positions(read, encoder.digitise(table.table_of(table_motor / scale), noise));
+        let own = control.cycle(target * scale, travel / servo.period_s * scale, read * scale);
         let limit = axis.base.torque_limit;
         let asked = added.get(cycle).map_or(own, |added| (own + added).clamp(-limit, limit));
-        torques.push((asked, body.torque()));
+        log.add(asked, body.torque());
+        while let Some(torque) = log.next() {
+            rows.torque(torque);
+        }
         body.advance(asked, fine);
         if late > 0 {
             seen[cycle % late] = (body.motor_position(), body.table_position());
         }
         body.advance(asked, steps - fine);
     }
-    let grid = setup.sensors.torque_grid;
-    trace.torque = (0..command.len())
-        .map(|cycle| on_grid(log.at(&torques, cycle) + noise.normal(setup.sensors.torque_noise), grid))
-        .collect();
-    Ok(trace)
+    log.end().for_each(|torque| rows.torque(torque));
+    Ok(())
 }
 
 /// Whole plant steps in a servo cycle.
@@ -220,20 +242,40 @@ struct TorqueLog {
     servo: Servo,
     delay_s: f64,
     start: f64,
+    /// Cycles so far, and rows that have been said.
+    cycles: usize,
+    rows: usize,
+    /// Of each of the last cycles what was asked for and the motor's torque at its start: as far back as the next row needs.
+    last: VecDeque<(f64, f64)>,
 }
 
 impl TorqueLog {
-    /// `torques` holds of each cycle what was asked for and the motor's torque at its start.
-    fn at(&self, torques: &[(f64, f64)], cycle: usize) -> f64 {
+    fn new(servo: Servo, delay_s: f64, start: f64) -> Self {
+        Self { servo, delay_s, start, cycles: 0, rows: 0, last: VecDeque::new() }
+    }
+
+    fn add(&mut self, asked: f64, begin: f64) {
+        self.cycles += 1;
+        self.last.push_back((asked, begin));
+    }
+
+    /// The torque of the next row, once it is known.
+    fn next(&mut self) -> Option<f64> {
+        if self.rows == self.cycles {
+            return None;
+        }
         let period = self.servo.period_s;
         // Rounded to a millionth of a cycle, so that a delay of whole cycles meets their starts.
-        let place = ((cycle as f64 - self.delay_s / period) * 1e6).round() / 1e6;
+        let place = ((self.rows as f64 - self.delay_s / period) * 1e6).round() / 1e6;
         if place < 0.0 {
-            return self.start;
+            self.rows += 1;
+            return Some(self.start);
         }
-        let Some(&(asked, begin)) = torques.get(place as usize) else {
-            return torques.last().map_or(self.start, |(asked, _)| *asked);
-        };
+        let back = self.cycles.checked_sub(place as usize).filter(|back| *back > 0)?;
+        while self.last.len() > back {
+            self.last.pop_front();
+        }
+        let (asked, begin) = *self.last.front()?;
         let since = place.fract() * period;
         let lag = self.servo.torque_time_constant_s;
         let left = match (lag > 0.0, since > 0.0) {
@@ -241,6 +283,13 @@ impl TorqueLog {
             (false, true) => 0.0,
             (false, false) => 1.0,
         };
-        asked + (begin - asked) * left
+        self.rows += 1;
+        Some(asked + (begin - asked) * left)
+    }
+
+    /// The torque of the rows that are left when no more cycles come: what was asked for last.
+    fn end(self) -> impl Iterator<Item = f64> {
+        let asked = self.last.back().map_or(self.start, |(asked, _)| *asked);
+        std::iter::repeat_n(asked, self.cycles - self.rows)
     }
 }

@@ -80,7 +80,7 @@ pub(super) fn checked(file: &str, mut time_s: Vec<f64>, mut columns: Vec<Column>
             issues.extend(breaks(column));
         }
     }
-    Ok(Recording { file: file.to_owned(), time_s, columns, sampling, holes, issues })
+    Ok(Recording { file: file.to_owned(), time_s: time_s.into(), columns, sampling, holes, issues })
 }
 
 fn same_length(file: &str, time_s: &[f64], columns: &[Column]) -> Result<(), RecordingError> {

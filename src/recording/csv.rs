@@ -128,7 +128,7 @@ mod tests {
     fn numbers_in_every_spelling() {
         let text = "\u{feff}time_s, x.position_mm ,x.torque_nm\r\n0,1e-3,+2\r\n 1 ,-4.5E2, \r\n2,NaN,-inf\r\n";
         let recording = Recording::read_csv(text.as_bytes(), "r.csv", 0).unwrap();
-        assert_eq!(recording.time_s, [0.0, 1.0, 2.0]);
+        assert_eq!(*recording.time_s, [0.0, 1.0, 2.0]);
         assert_eq!(recording.columns[0].name, "x.position_mm");
         assert_eq!(recording.columns[0].values[..2], [1e-3, -450.0]);
         assert!(recording.columns[0].values[2].is_nan());

@@ -21,6 +21,7 @@ use std::borrow::Cow;
 use std::fs::File;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 pub use check::{Issue, IssueKind};
 pub use error::RecordingError;
@@ -74,8 +75,8 @@ impl Column {
 pub struct Recording {
     /// The file as the user named it, for messages.
     pub file: String,
-    /// Time of each row in seconds, strictly increasing, finite.
-    pub time_s: Vec<f64>,
+    /// Time of each row in seconds, strictly increasing, finite; long recordings have no room for a copy.
+    pub time_s: Arc<Vec<f64>>,
     /// All columns but the time, in file order.
     pub columns: Vec<Column>,
     /// How the rows lie in time.

@@ -83,7 +83,7 @@ mod tests {
         writer.close().unwrap();
 
         let recording = Recording::open(&path).unwrap();
-        assert_eq!(recording.time_s, [0.0, 0.5, 1.0]);
+        assert_eq!(*recording.time_s, [0.0, 0.5, 1.0]);
         let position = recording.column("x", Signal::Position).unwrap().to(Unit::Mm).unwrap();
         assert_eq!((position[0], position[2]), (1.5, 2.5));
         assert!(position[1].is_nan());

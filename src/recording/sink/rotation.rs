@@ -139,7 +139,7 @@ mod tests {
         assert_eq!(rotation.written, Written { files: 4, removed: 2, rows: 15, lost: 1, gaps: 1 });
         assert!(!folder.path().join("run-0002.csv").exists());
         let read = Recording::open(&folder.path().join("run-0003.csv")).unwrap();
-        assert_eq!(read.time_s, [0.008, 0.009, 0.010, 0.011]);
+        assert_eq!(*read.time_s, [0.008, 0.009, 0.010, 0.011]);
         assert_eq!(read.columns[0].values[1], 10.0);
         assert_eq!(read.columns[1].values[3], 35.0 / 3.0);
         assert_eq!(

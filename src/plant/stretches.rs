@@ -4,14 +4,14 @@
 //! missing, as the motion does. So a hole of few rows is filled in by what lies beside it, and only the rows near to it are not
 //! judged.
 
-use crate::plant::stamps::times_on_a_grid;
+use super::stamps::times_on_a_grid;
 use crate::recording::{Column, Recording};
 use std::ops::Range;
 
 /// The longest hole in a motion that is bridged, rows.
-const LONGEST_IN_MOTION: usize = 3;
+pub const LONGEST_IN_MOTION: usize = 3;
 /// The same in another column while the motion is known, s.
-const LONGEST_BESIDE_S: f64 = 0.1;
+pub const LONGEST_BESIDE_S: f64 = 0.1;
 
 /// Rows of a recording in one stretch, without a hole between them that is not bridged.
 #[derive(Debug, PartialEq)]
@@ -109,44 +109,58 @@ pub fn without_long_holes(runs: Vec<Range<usize>>, beside: &[&Column], period_s:
 /// Fills in what is no number by a straight line between what lies beside it.
 pub fn fill_straight(values: &mut [f64]) {
     for hole in holes(values) {
-        let before = hole.start.checked_sub(1).map(|row| values[row]);
-        let (first, last) = match (before, values.get(hole.end).copied()) {
-            (Some(before), Some(after)) => (before, after),
-            (Some(one), None) | (None, Some(one)) => (one, one),
-            (None, None) => return,
-        };
-        let step = (last - first) / (hole.len() + 1) as f64;
-        for (k, row) in hole.enumerate() {
-            values[row] = first + step * (k + 1) as f64;
-        }
+        fill_straight_in(values, hole);
+    }
+}
+
+fn fill_straight_in(values: &mut [f64], hole: Range<usize>) {
+    let before = hole.start.checked_sub(1).map(|row| values[row]);
+    let (first, last) = match (before, values.get(hole.end).copied()) {
+        (Some(before), Some(after)) => (before, after),
+        (Some(one), None) | (None, Some(one)) => (one, one),
+        (None, None) => return,
+    };
+    let step = (last - first) / (hole.len() + 1) as f64;
+    for (k, row) in hole.enumerate() {
+        values[row] = first + step * (k + 1) as f64;
     }
 }
 
 /// Fills in what is no number by the cubic through the two numbers on either side, on a grid where there is one.
 pub fn fill_smooth(values: &mut [f64], grid: f64) {
-    let given = values.to_vec();
-    let known = |row: &usize| given[*row].is_finite();
     let holes = holes(values);
-    fill_straight(values);
+    fill_between(values, &holes, grid);
+}
+
+/// The same in these rows alone, which are in order.
+pub fn fill_between(values: &mut [f64], holes: &[Range<usize>], grid: f64) {
     for hole in holes {
+        fill_straight_in(values, hole.clone());
+    }
+    for hole in holes {
+        let filled = |row: usize| {
+            holes.get(holes.partition_point(|hole| hole.end <= row)).is_some_and(|hole| hole.contains(&row))
+        };
+        let known = |row: &usize| values[*row].is_finite() && !filled(*row);
         let before = (0..hole.start).rev().filter(known).take(2);
-        let nodes: Vec<usize> = before.chain((hole.end..given.len()).filter(known).take(2)).collect();
+        let nodes: Vec<usize> = before.chain((hole.end..values.len()).filter(known).take(2)).collect();
         if nodes.len() < 4 {
             continue;
         }
-        for row in hole {
+        for row in hole.clone() {
             let weight = |node: usize| -> f64 {
                 let others = nodes.iter().filter(|other| **other != node);
                 others.map(|&other| (row as f64 - other as f64) / (node as f64 - other as f64)).product()
             };
-            let smooth: f64 = nodes.iter().map(|&node| weight(node) * given[node]).sum();
+            let smooth: f64 = nodes.iter().map(|&node| weight(node) * values[node]).sum();
             values[row] = if grid > 0.0 { (smooth / grid).round() * grid } else { smooth };
         }
     }
 }
 
 /// Where a column holds no numbers.
-fn holes(values: &[f64]) -> Vec<Range<usize>> {
+#[must_use]
+pub fn holes(values: &[f64]) -> Vec<Range<usize>> {
     let mut holes: Vec<Range<usize>> = Vec::new();
     for row in (0..values.len()).filter(|row| !values[*row].is_finite()) {
         match holes.last_mut() {
