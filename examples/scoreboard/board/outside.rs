@@ -24,11 +24,18 @@ pub enum Kind {
     Detent { centre: f64, width: f64 },
     /// Drag by the cube of speed (load units/s at which it is 1).
     CubicDrag { speed: f64 },
+    /// Drag of a brake by eddy currents: largest, and 1, at one speed (load units/s).
+    EddyDrag { speed: f64 },
+    /// Friction by the logarithm of speed, as of a film that never parts: speed (load units/s) above which it grows so, and where it
+    /// is 1.
+    LogarithmicFriction { from: f64, speed: f64 },
+    /// Drag by the square of speed one way (±1) alone: a cover that folds one way and drags the other. 1 at that speed.
+    OneWayDrag { way: f64, speed: f64 },
     /// A torque that begins at a place of the stroke: a wiper that only touches from there on.
     ForceStep { at: f64 },
 }
 
-pub const NAMES: [&str; 10] = [
+pub const NAMES: [&str; 13] = [
     "stepped_friction",
     "wandering_torque",
     "bistable_offset",
@@ -39,6 +46,9 @@ pub const NAMES: [&str; 10] = [
     "detent",
     "cubic_drag",
     "force_step",
+    "eddy_drag",
+    "logarithmic_friction",
+    "one_way_drag",
 ];
 
 #[derive(Clone, Debug)]
@@ -112,6 +122,12 @@ impl Outside {
             },
             "cubic_drag" => Kind::CubicDrag { speed: 0.7 * rig.reach.speed },
             "force_step" => Kind::ForceStep { at: rig.reach.low + stroke * shape.uniform(0.4, 0.6) },
+            "eddy_drag" => Kind::EddyDrag { speed: rig.reach.speed * shape.uniform(0.1, 0.35) },
+            "logarithmic_friction" => {
+                let speed = rig.reach.speed;
+                Kind::LogarithmicFriction { from: speed * shape.log_uniform(0.01, 0.1), speed }
+            }
+            "one_way_drag" => Kind::OneWayDrag { way: shape.sign(), speed: 0.7 * rig.reach.speed },
             _ => return None,
         };
         Some(Self { kind, magnitude })
@@ -127,6 +143,7 @@ impl Outside {
                     i => f64::from(t - at[i - 1].0 < at[i - 1].1),
                 },
                 Kind::SpeedBump { speed, width } => (-((v.abs() - speed) / width).powi(2)).exp(),
+                Kind::LogarithmicFriction { from, speed } => (v.abs() / from).ln_1p() / (speed / from).ln_1p(),
                 Kind::PulsingFriction { period, phase } => (std::f64::consts::TAU * t / period + phase).sin(),
                 _ => 0.0,
             }
@@ -146,6 +163,8 @@ impl Outside {
                     (std::f64::consts::TAU * (f0 * t + 0.5 * (f1 - f0) * t * t / time)).sin()
                 }
                 Kind::CubicDrag { speed } => (v / speed).powi(3),
+                Kind::EddyDrag { speed } => 2.0 * (v / speed) / (1.0 + (v / speed).powi(2)),
+                Kind::OneWayDrag { way, speed } => way * (way * v / speed).max(0.0).powi(2),
                 Kind::ForceStep { at } => 0.5f64.copysign(x - at),
                 Kind::Detent { centre, width } => {
                     // The slope of a potential well: pulls towards the centre from both sides.

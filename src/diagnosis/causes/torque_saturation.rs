@@ -6,8 +6,8 @@ use super::*;
 /// Parameter: the limit as a share of the largest measured torque. The coefficient is 1 − r.
 pub static LAW: Law = Law {
     cause: Cause::TorqueSaturation,
-    scales: &[Scale::Log(0.25, 0.98)],
-    starts: |_, _| (0..9).map(|i| vec![0.3 + 0.075 * f64::from(i)]).collect(),
+    scales: &[Scale::Log(0.1, 0.98)],
+    starts: |_, _| (0..10).map(|i| vec![0.12 * 1.25f64.powi(i)]).collect(),
     manner: PLAIN,
     terms: |frame, shapes| {
         each(shapes, |shape| {

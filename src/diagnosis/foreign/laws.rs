@@ -29,7 +29,7 @@ impl Foreign {
     }
 }
 
-pub static LAWS: [Foreign; 21] = [
+pub static LAWS: [Foreign; 24] = [
     Foreign {
         goes: "with the cube of speed",
         numbers: 1,
@@ -45,6 +45,33 @@ pub static LAWS: [Foreign; 21] = [
             let mut roots: Vec<f64> = frame.v.iter().map(|v| v.abs() * per).collect();
             to_the_power(&mut roots, LARGEST_EXPONENT * exponent);
             vec![frame.judged_by(|i| frame.direction[i] * roots[i])]
+        },
+    },
+    Foreign {
+        goes: "with the logarithm of speed",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| {
+            let per = SHORTEST.powf(share - 1.0) / frame.top_speed();
+            vec![frame.judged_by(|i| frame.direction[i] * (frame.v[i].abs() * per).ln_1p())]
+        },
+    },
+    Foreign {
+        goes: "with the square of speed, one way there and another way back",
+        numbers: 2,
+        somewhere: false,
+        regressors: |frame, _| {
+            let drag = |i: usize| frame.v[i].powi(2);
+            vec![frame.judged_by(drag), frame.judged_by(|i| frame.direction[i] * drag(i))]
+        },
+    },
+    Foreign {
+        goes: "as a drag that is largest at one speed, as that of a brake by eddy currents",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| {
+            let per = 1.0 / (share * frame.top_speed()).max(1e-300);
+            vec![frame.judged_by(|i| frame.v[i] * per / (1.0 + (frame.v[i] * per).powi(2)))]
         },
     },
     Foreign {
@@ -187,7 +214,7 @@ pub static LAWS: [Foreign; 21] = [
 
 /// Largest exponent of a root: with more it is hardly another law than viscous friction.
 const LARGEST_EXPONENT: f64 = 0.75;
-/// The shortest length, as a share of the stroke, and the shortest time, of the longest.
+/// The shortest length, as a share of the stroke, the shortest time, of the longest, and the lowest speed, of the top speed.
 const SHORTEST: f64 = 0.003;
 /// The longest time by which something comes late, s.
 const LATEST_S: f64 = 3.0;
