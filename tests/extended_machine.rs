@@ -5,7 +5,7 @@ use gib::diagnosis::causes::LAWS;
 use gib::diagnosis::experiment::telling;
 use gib::diagnosis::frame::{Columns, Frame};
 use gib::diagnosis::{Diagnosis, Verdict, diagnose};
-use gib::machine::{Axis, Cause, Effect, Machine};
+use gib::machine::{Axis, Cause, Effect, Machine, Servo};
 use gib::plant::closed_loop::predict;
 use gib::plant::motion::smoothed;
 use gib::plant::moves::{Moves, Reach};
@@ -81,6 +81,44 @@ fn a_delay_is_found_at_every_phase_of_the_cycle() {
         let deviation = d.findings[0].deviations[0];
         assert!((found - delay_ms).abs() < 3.0 * deviation && deviation < 0.1, "{delay_ms}: {found} ± {deviation}");
     }
+}
+
+/// A torque column with so much noise tells a number badly; the position of the closed loop tells it too. A servo that is not the
+/// one of the machine file contradicts the torque, which then counts alone.
+#[test]
+fn the_position_tells_numbers_that_the_noise_of_the_torque_hides() {
+    let low_speed = Effect::StribeckFriction { torque: 0.4, velocity_mm_s: 8.0, exponent: 2.0 };
+    for truth in [Effect::CoulombFrictionMismatch { torque: 1.1 }, low_speed] {
+        let (mut squares, mut inside) = ([0.0; 2], 0);
+        for seed in [21, 22, 23, 24] {
+            let with = recorded_by(&rig(&[truth]), &test_moves(), seed, good(0.3), false);
+            let mut without = with.clone();
+            without.columns.retain(|column| column.name != "x.position_command_mm");
+            for (recording, square) in [&with, &without].into_iter().zip(&mut squares) {
+                let d = judged(&rig(&[]), recording);
+                assert_eq!(named(&d), vec![truth.cause()], "{truth:?}, seed {seed}");
+                let off = d.findings[0].effect.values()[0] / truth.values()[0] - 1.0;
+                let deviation = d.findings[0].deviations[0] / truth.values()[0];
+                *square += off * off;
+                inside += u32::from(off.abs() < 2.5 * deviation);
+            }
+        }
+        println!(
+            "{}: {:.1e} of itself, by the torque alone {:.1e}",
+            truth.cause(),
+            squares[0].sqrt(),
+            squares[1].sqrt()
+        );
+        assert!(squares[0] < squares[1] / 16.0 && inside >= 7, "{truth:?}: {squares:?}, {inside} of 8 intervals hold");
+    }
+
+    let truth = Effect::CoulombFrictionMismatch { torque: 1.1 };
+    let recording = recorded_by(&rig(&[truth]), &test_moves(), 21, good(0.03), false);
+    let mut other = rig(&[]);
+    other.servo = other.servo.map(|servo| Servo { velocity_gain: 1.15 * servo.velocity_gain, ..servo });
+    let d = judged(&other, &recording);
+    let Effect::CoulombFrictionMismatch { torque } = d.findings[0].effect else { panic!("{:?}", d.findings) };
+    assert!((torque / 1.1 - 1.0).abs() < 3e-3, "{torque}");
 }
 
 /// Nobody knows beforehand how friction goes near standstill, or how a stretch of guideway begins and ends: another form is found

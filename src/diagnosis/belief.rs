@@ -129,6 +129,14 @@ pub fn extended(axis: &Axis, found: &[Effect]) -> Axis {
     axis.with_effects(effects)
 }
 
+/// The axis with effects as a fit on the axis `fitted` found them.
+#[must_use]
+pub fn with_found(axis: &Axis, fitted: &Axis, found: Vec<Effect>) -> Axis {
+    let mut effects: Vec<Effect> = found.into_iter().map(|effect| together(axis, effect)).collect();
+    reconcile(fitted, effects.iter_mut());
+    extended(axis, &effects)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -5,6 +5,7 @@
 //! Gauss–Newton with step halving on what is left (variable projection, Golub and Pereyra 1973).
 
 mod beside;
+mod given;
 mod slopes;
 mod smoothed;
 

@@ -130,7 +130,7 @@ fn without_substitutes(bench: &Bench, found: Selection, watch: &Watch) -> Result
 
 /// Whether the exponent is surely not that of the plain bristle. Elements of this exponent go the same way after a full reversal.
 fn is_surely_another(bench: &Bench, fit: &Fit, at: usize) -> bool {
-    match uncertainty::effects(bench, fit).swap_remove(at) {
+    match uncertainty::effects(bench, fit, None).swap_remove(at) {
         Some((Effect::PreslidingFriction { exponent, .. }, deviations)) => {
             (exponent - BRISTLE[0]).abs() > LEAST_STRENGTH * deviations[1]
         }

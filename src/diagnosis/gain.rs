@@ -4,9 +4,9 @@ use super::belief;
 use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
 use super::progress::{Stopped, Watch};
-use crate::machine::{Axis, Effect};
+use crate::machine::Axis;
 use crate::plant::added::ByServo;
-use crate::plant::closed_loop::predict_by;
+use crate::plant::closed_loop::{Manner, predict_by};
 use crate::plant::observed::Observed;
 use crate::plant::predict::{TorquePrediction, predict_torque};
 
@@ -23,20 +23,27 @@ pub struct Gain {
     pub ci95: [f64; 2],
 }
 
-/// Errors of one machine on a recording: torque, closed-loop position, table position; NaN where not predicted, and for the
-/// torque where the axis stands, since friction then is not a function of the motion.
-pub type Errors = [Option<Vec<f64>>; 3];
+/// Errors of one machine on a recording.
+#[derive(Debug, Clone)]
+pub struct Errors {
+    /// Torque, closed-loop position, table position; NaN where not predicted, and for the torque where the axis stands, since
+    /// friction then is not a function of the motion.
+    channels: [Option<Vec<f64>>; 3],
+    /// How the loop was replayed, where it was.
+    pub manner: Option<Manner>,
+}
 
 fn errors(axis: &Axis, observed: &Observed, servo: &ByServo) -> Option<Errors> {
     let prediction = predict_by(axis, observed, servo).ok()?;
     let less =
         |measured: &[f64], model: &[f64]| -> Vec<f64> { measured.iter().zip(model).map(|(m, p)| m - p).collect() };
     let replayed = prediction.closed_loop.as_ref();
-    Some([
+    let channels = [
         Some(torque_errors(observed, &prediction.torque)),
         replayed.map(|r| less(&observed.position, &r.position)),
         observed.table_position.as_ref().zip(replayed.and_then(|r| r.table_position.as_ref())).map(|(t, r)| less(t, r)),
-    ])
+    ];
+    Some(Errors { channels, manner: prediction.manner() })
 }
 
 /// Errors of the torque; NaN where the axis stands.
@@ -80,9 +87,10 @@ impl Holdout {
 /// Errors by which a law may be refuted: of the torque only in judged rows and as they count there. Where the axis sticks or
 /// breaks away few rows hold more error than all others, and no law is answerable for it.
 fn in_judged_rows(errors: &Errors, weight: &[f64]) -> Errors {
-    let [torque, position, table] = errors.clone();
-    let weighed = |torque: Vec<f64>| torque.iter().zip(weight).map(|(error, weight)| error * weight).collect();
-    [torque.map(weighed), position, table]
+    let mut judged = errors.clone();
+    let torque = judged.channels[0].iter_mut().flatten();
+    torque.zip(weight).for_each(|(error, weight)| *error *= weight);
+    judged
 }
 
 /// The fitted recording itself as rows that were not fitted: half of its blocks are predicted by a machine that was fitted to
@@ -133,10 +141,11 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
         let of_half =
             self.watch.each(&machines, (0.92, 0.99), "measuring the gain", |axis| errors(axis, observed, servo))?;
         let (Some(Some(even)), Some(Some(odd))) = (of_half.first(), of_half.last()) else { return Ok(None) };
-        Ok(Some(std::array::from_fn(|channel| {
-            let (even, odd) = (even[channel].as_ref()?, odd[channel].as_ref()?);
+        let channels = std::array::from_fn(|channel| {
+            let (even, odd) = (even.channels[channel].as_ref()?, odd.channels[channel].as_ref()?);
             Some(self.half.iter().enumerate().map(|(i, half)| [even[i], odd[i], f64::NAN][*half]).collect())
-        })))
+        });
+        Ok(Some(Errors { channels, manner: even.manner.clone() }))
     }
 
     /// RMS of the torque while the axis moves, by a machine with this set of causes.
@@ -147,6 +156,12 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
         let moving = torque_errors(observed, &prediction);
         let (sum, count) = moving.iter().filter(|e| e.is_finite()).fold((0.0, 0.0), |(s, n), e| (s + e * e, n + 1.0));
         (count > 0.0).then(|| f64::sqrt(sum / count))
+    }
+
+    /// The axis, and its recording, every row, with what that says of the servo.
+    #[must_use]
+    pub fn recording(&self) -> Option<(&Axis, (&Observed, &ByServo))> {
+        self.observed.as_ref().map(|(observed, servo)| (self.axis, (observed, servo)))
     }
 
     /// Errors by which a law may be refuted.
@@ -167,11 +182,10 @@ fn fitted_without(axis: &Axis, bench: &Bench, fit: &Fit, half: usize) -> Axis {
     let coefficients = bench.coefficients_without(fit, |block| half_of(block) == half);
     let effect = |(i, part): (usize, &super::fit::Part)| {
         let of = |c: &[f64]| (part.law.effect)(bench.frame, &part.shape, c);
-        of(&coefficients[i]).or_else(|| of(&fit.coefficients[i])).map(|e| belief::together(axis, e))
+        of(&coefficients[i]).or_else(|| of(&fit.coefficients[i]))
     };
-    let mut effects: Vec<Effect> = fit.parts.iter().enumerate().filter_map(effect).collect();
-    belief::reconcile(bench.frame.axis, effects.iter_mut());
-    belief::extended(axis, &effects)
+    let effects = fit.parts.iter().enumerate().filter_map(effect).collect();
+    belief::with_found(axis, bench.frame.axis, effects)
 }
 
 /// Rows of neither half.
@@ -218,7 +232,7 @@ fn weight_of_rows(frame: &Frame, time_s: &[f64]) -> Vec<f64> {
 /// the motor's following error is by far the most, with which what a spring does may happen to go.
 #[must_use]
 pub fn of_stretch(before: Option<&Errors>, after: Option<&Errors>) -> Option<Gain> {
-    let stretch = |[_, motor, table]: &Errors| -> Option<Vec<f64>> {
+    let stretch = |Errors { channels: [_, motor, table], .. }: &Errors| -> Option<Vec<f64>> {
         Some(table.as_ref()?.iter().zip(motor.as_ref()?).map(|(table, motor)| table - motor).collect())
     };
     gain("table_position - position", &stretch(before?)?, &stretch(after?)?)
@@ -226,7 +240,7 @@ pub fn of_stretch(before: Option<&Errors>, after: Option<&Errors>) -> Option<Gai
 
 fn gains(axis: &Axis, before: &Errors, after: &Errors) -> Vec<Gain> {
     let names = [axis.drive.torque_word(), "position", "table_position"];
-    let pairs = names.into_iter().zip(before.iter().zip(after));
+    let pairs = names.into_iter().zip(before.channels.iter().zip(&after.channels));
     pairs.filter_map(|(name, (before, after))| gain(name, before.as_ref()?, after.as_ref()?)).collect()
 }
 

@@ -16,6 +16,7 @@ use super::select::Selection;
 use super::show::{self, Coordinate};
 use super::verdict::Verdict;
 use crate::machine::{Axis, Cause, Effect};
+use crate::plant::closed_loop::Manner;
 use crate::plant::physics::LEAST_SLOPE;
 
 /// Excess over the noise floor (in variance) below which a belief holds.
@@ -62,6 +63,8 @@ pub struct Judged {
     pub selection: Selection,
     /// What they are worth on held-out blocks.
     pub gains: Vec<Gain>,
+    /// How the closed loop of what is named was replayed there, where it was.
+    pub manner: Option<Manner>,
     /// What explains the recording and is not named all the same.
     pub refutation: Option<String>,
 }
@@ -73,6 +76,12 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let (held_out, empty) = (HeldOut::new(axis, whole, bench, watch), bench.fit(Vec::new()));
         let believed = held_out.believed();
         Self { bench, watch, held_out, empty, believed }
+    }
+
+    /// What the sets are judged on.
+    #[must_use]
+    pub fn held_out(&self) -> &HeldOut<'j, 'f, 'a> {
+        &self.held_out
     }
 
     /// Judges a set of causes.
@@ -105,7 +114,8 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let effects: Vec<Effect> = found.fit.effects(self.bench.frame).collect();
         let misleads = verdict == Verdict::PartlyExplained && moves_worse(&in_judged_rows);
         if !misleads && !refuted(&in_judged_rows, &effects) {
-            return Ok(Judged { verdict, selection: found, gains, refutation: None });
+            let manner = errors.and_then(|errors| errors.manner);
+            return Ok(Judged { verdict, selection: found, gains, manner, refutation: None });
         }
         let causes = found.fit.parts.iter().map(|p| p.law.cause);
         let refutation = refutation(causes, &in_judged_rows, "rows that it was not fitted to");
@@ -131,6 +141,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             verdict: if unknown { Verdict::UnknownCause } else { Verdict::NoDiscrepancy },
             selection: Selection { fit: self.empty.clone(), rivals: Vec::new(), alike: Vec::new() },
             gains: self.held_out.gains(self.believed.as_ref(), self.believed.as_ref()),
+            manner: None,
             refutation: None,
         }
     }

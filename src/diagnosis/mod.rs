@@ -31,6 +31,7 @@ mod many;
 mod narrow;
 pub mod progress;
 mod reopened;
+mod replayed;
 mod rows;
 pub mod sampling;
 pub mod select;

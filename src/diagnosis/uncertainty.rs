@@ -22,7 +22,7 @@ const LAW_HOLDS: f64 = 1e-3;
 /// noise and grid pull the fit one way in every block, and the impacts of a clearance leave many minima side by side. With twice the
 /// jackknife's deviation 78 of 100 random clearances lay within 95 %; with three times it 24 of 27 others, and 53 of 54
 /// numbers of springs.
-const SIMULATED: f64 = 3.0;
+pub(super) const SIMULATED: f64 = 3.0;
 
 /// Share of an unknown's column that one block may hold: leaving out a block that holds all of it would not move it.
 const MOST_IN_A_BLOCK: f64 = 0.5;
@@ -81,14 +81,63 @@ pub fn strengths(bench: &Bench, fit: &Fit) -> Vec<f64> {
     fit.parts.iter().enumerate().map(strength).collect()
 }
 
-/// Effects with the standard deviation of each parameter, in the order of the fit's parts. `None` where the parameters
-/// left their physical bounds.
+/// The unknowns of a fit and how sure they are.
+#[derive(Debug, Clone)]
+pub struct Sure {
+    /// Part and index of each non-linear parameter; in the order of the unknowns they come after the coefficients of all parts.
+    pub shapes: Vec<(usize, usize)>,
+    /// Covariance of all unknowns, non-linear parameters in the units of their scales; as exactly as laws hold.
+    pub covariance: DMatrix<f64>,
+}
+
+/// What the blocks say of each unknown of a fit.
 #[must_use]
-pub fn effects(bench: &Bench, fit: &Fit) -> Vec<Option<(Effect, Vec<f64>)>> {
+pub fn of_unknowns(bench: &Bench, fit: &Fit) -> Sure {
     let slopes = bench.slopes(fit, 0);
-    let Unknowns { columns, coefficient_at, first_slope } = Unknowns::of(fit, &slopes);
+    let Unknowns { columns, first_slope, .. } = Unknowns::of(fit, &slopes);
     let spread = Spread::of(bench, fit, &columns);
-    let misfit = misfit(bench, fit);
+    let simulated = SIMULATED * misfit(bench, fit);
+    let mut widened = Vec::with_capacity(columns.len());
+    let mut open = Vec::with_capacity(columns.len());
+    for (part, own) in fit.parts.iter().zip(&fit.coefficients) {
+        let widening = if part.law.manner.simulated { simulated } else { 1.0 };
+        widened.extend(own.iter().map(|_| widening));
+        open.extend(own.iter().map(|c| (LAW_HOLDS * c).powi(2)));
+    }
+    for Slope { part, index, .. } in &slopes {
+        let (part, alone) = (&fit.parts[*part], fit.coefficients[*part].is_empty());
+        let (scale, at) = (part.law.scales[*index], part.shape[*index]);
+        widened.push(if part.law.manner.simulated { simulated } else { 1.0 });
+        let holds = if alone { LAW_HOLDS * at.abs() / scale.rate(at) } else { 0.0 };
+        open.push(holds.hypot(scale.stopped_between(at).map_or(0.0, |range| range / 1.96)).powi(2));
+    }
+    let alone = |unknown: usize| DVector::from_fn(columns.len(), |i, _| f64::from(u8::from(i == unknown)));
+    widened.iter_mut().enumerate().for_each(|(i, widened)| *widened *= spread.widening(&alone(i)));
+    let mut covariance =
+        DMatrix::from_fn(columns.len(), columns.len(), |i, j| widened[i] * widened[j] * spread.covariance(i, j));
+    open.iter().enumerate().for_each(|(i, open)| covariance[(i, i)] += open);
+    debug_assert_eq!(first_slope + slopes.len(), columns.len());
+    Sure { shapes: slopes.iter().map(|slope| (slope.part, slope.index)).collect(), covariance }
+}
+
+/// Effects with the standard deviation of each parameter, in the order of the fit's parts; `None` where the parameters
+/// left their physical bounds. How sure the unknowns are is what the blocks say, unless it is given.
+#[must_use]
+pub fn effects(bench: &Bench, fit: &Fit, sure: Option<&Sure>) -> Vec<Option<(Effect, Vec<f64>)>> {
+    let slopes = if sure.is_some() { Vec::new() } else { bench.slopes(fit, 0) };
+    let Unknowns { columns, coefficient_at, first_slope } = Unknowns::of(fit, &slopes);
+    let by_blocks = sure.is_none().then(|| (Spread::of(bench, fit, &columns), misfit(bench, fit)));
+    let shapes: Vec<(usize, usize)> =
+        sure.map_or_else(|| slopes.iter().map(|slope| (slope.part, slope.index)).collect(), |sure| sure.shapes.clone());
+    let unknowns = first_slope + shapes.len();
+    let deviation_of = |part: &Part, gradient: &DVector<f64>| match (&by_blocks, sure) {
+        (Some((spread, misfit)), _) => {
+            let widened = if part.law.manner.simulated { SIMULATED * misfit } else { 1.0 };
+            widened * spread.deviation(gradient)
+        }
+        (None, Some(sure)) => gradient.dot(&(&sure.covariance * gradient)).max(0.0).sqrt(),
+        (None, None) => 0.0,
+    };
     fit.parts
         .iter()
         .enumerate()
@@ -97,7 +146,7 @@ pub fn effects(bench: &Bench, fit: &Fit) -> Vec<Option<(Effect, Vec<f64>)>> {
             let effect = effect_of(&part.shape, &fit.coefficients[i])?;
             let values = effect.values();
             // Derivatives of the file's parameters by each unknown of this part.
-            let mut gradient = DMatrix::<f64>::zeros(values.len(), columns.len());
+            let mut gradient = DMatrix::<f64>::zeros(values.len(), unknowns);
             let mut differ = |unknown: usize, step: f64, moved: Option<Effect>| {
                 if let Some(moved) = moved.filter(|_| step != 0.0) {
                     for (k, (a, b)) in moved.values().iter().zip(&values).enumerate() {
@@ -113,30 +162,29 @@ pub fn effects(bench: &Bench, fit: &Fit) -> Vec<Option<(Effect, Vec<f64>)>> {
                 c[k] += step;
                 differ(unknown, step, effect_of(&part.shape, &c));
             }
-            for (s, slope) in slopes.iter().enumerate().filter(|(_, s)| s.part == i) {
+            let own_shapes = || shapes.iter().enumerate().filter(|(_, of)| of.0 == i).map(|(s, of)| (s, of.1));
+            for (s, index) in own_shapes() {
                 let mut shape = part.shape.clone();
-                let scale = part.law.scales[slope.index];
-                let step = 1e-4 * shape[slope.index].abs().max(1e-6);
-                shape[slope.index] += step;
-                let rate = scale.rate(part.shape[slope.index]);
+                let scale = part.law.scales[index];
+                let step = 1e-4 * shape[index].abs().max(1e-6);
+                shape[index] += step;
+                let rate = scale.rate(part.shape[index]);
                 differ(first_slope + s, step / rate, effect_of(&shape, &fit.coefficients[i]));
             }
             // A number that stopped at its bound may be anything within them: blocks that agree on the bound know no better.
-            let own_slopes = slopes.iter().enumerate().filter(|(_, slope)| slope.part == i);
-            let ends: Vec<(usize, f64)> = own_slopes
-                .filter_map(|(s, slope)| {
-                    let range = part.law.scales[slope.index].stopped_between(part.shape[slope.index])?;
+            let ends: Vec<(usize, f64)> = own_shapes()
+                .filter_map(|(s, index)| {
+                    let range = part.law.scales[index].stopped_between(part.shape[index])?;
                     Some((first_slope + s, range / 1.96))
                 })
                 .collect();
-            let widened = if part.law.manner.simulated { SIMULATED * misfit } else { 1.0 };
             let own = coefficient_at[i]..coefficient_at[i] + fit.coefficients[i].len();
             let deviation = |k: usize| {
                 let by_coefficients =
                     own.clone().zip(&fit.coefficients[i]).map(|(u, c)| (gradient[(k, u)] * c).powi(2)).sum::<f64>();
                 let size = if own.is_empty() { values[k].abs() } else { by_coefficients.sqrt() };
-                let by_blocks = (widened * spread.deviation(&gradient.row(k).transpose())).hypot(LAW_HOLDS * size);
-                ends.iter().fold(by_blocks, |all, (unknown, range)| all.hypot(gradient[(k, *unknown)] * range))
+                let found = deviation_of(part, &gradient.row(k).transpose()).hypot(LAW_HOLDS * size);
+                ends.iter().fold(found, |all, (unknown, range)| all.hypot(gradient[(k, *unknown)] * range))
             };
             let mut deviations: Vec<f64> = (0..values.len()).map(deviation).collect();
             match (effect, deviations.as_mut_slice()) {
@@ -182,7 +230,7 @@ pub fn widen(bench: &Bench, effects: &mut [Option<(Effect, Vec<f64>)>], alike: &
 pub fn late_by_sampling(bench: &Bench, fit: &Fit) -> Option<f64> {
     let open_s = bench.frame.sampling.deviation_s();
     let part = fit.parts.iter().position(|part| part.law.cause == Cause::DeadTime).filter(|_| open_s > 0.0)?;
-    let (_, deviations) = effects(bench, fit).swap_remove(part)?;
+    let (_, deviations) = effects(bench, fit, None).swap_remove(part)?;
     let late_ms = *fit.parts[part].shape.first()?;
     (late_ms.abs() < 2.0 * deviations.first()?).then_some(1e-3 * late_ms)
 }

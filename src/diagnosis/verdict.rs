@@ -13,9 +13,10 @@ use super::known::Known;
 use super::narrow::{self, Band};
 use super::progress::{Progress, Stopped, Watch};
 use super::reopened;
+use super::replayed;
 use super::select::{Search, Selection};
 use super::show::{self, View};
-use super::uncertainty;
+use super::uncertainty::{self, Sure};
 use crate::machine::{Axis, Cause, Effect};
 use crate::recording::{Recording, RecordingError};
 
@@ -209,7 +210,12 @@ fn answer_on(
         }
     }
     notes.extend(judged.refutation.take());
-    let mut findings = findings(axis, bench, &judged.selection, &empty);
+    let replayed = replayed::refined(bench, judge.held_out(), &judged, watch)?;
+    let sure = replayed.map(|replayed| {
+        judged.selection.fit = replayed.fit;
+        replayed.sure
+    });
+    let mut findings = findings(axis, bench, &judged.selection, sure.as_ref(), &empty);
     let mut extended = extended_by(axis, &findings);
     if let Some(holdout) = holdout {
         match Columns::of(holdout, axis).map(|columns| (columns.notes(holdout, axis), Holdout::new(axis, columns))) {
@@ -346,9 +352,9 @@ fn what_is_missing(frame: &Frame) -> Vec<String> {
     missing
 }
 
-fn findings(axis: &Axis, bench: &Bench, selection: &Selection, empty: &Fit) -> Vec<Finding> {
+fn findings(axis: &Axis, bench: &Bench, selection: &Selection, sure: Option<&Sure>, empty: &Fit) -> Vec<Finding> {
     let fit = &selection.fit;
-    let mut effects = uncertainty::effects(bench, fit);
+    let mut effects = uncertainty::effects(bench, fit, sure);
     uncertainty::widen(bench, &mut effects, &selection.alike);
     belief::reconcile(bench.frame.axis, effects.iter_mut().flatten().map(|(effect, _)| effect));
     let total = 1.0 - (fit.squares() / empty.squares()).min(1.0);

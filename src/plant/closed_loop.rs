@@ -7,9 +7,10 @@ use super::added::{Added, ByServo, Pulses};
 use super::between::cubic_of;
 use super::noise::Noise;
 use super::observed::Observed;
+use super::physics::{Physics, Ripple};
 use super::predict::{TorquePrediction, predict_torque};
 use super::servo::CommandSpeed;
-use super::simulate::{Rows, Setup, Start, simulate_cycles};
+use super::simulate::{Rows, Setup, Start, simulate_cycles, steps_per_cycle};
 use crate::machine::Axis;
 use std::iter::Peekable;
 use std::ops::Range;
@@ -91,6 +92,96 @@ fn replayed(
     Ok(Prediction { torque, closed_loop: Some(replayed), added: added.map(|added| added.pulses), command_speed })
 }
 
+/// In what manner a recording is replayed: what a prediction found in it beside the machine's numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Manner {
+    command_speed: CommandSpeed,
+    /// Whether the axis felt what was added to the servo's torque.
+    felt: bool,
+    at_start: f64,
+    /// Of each ripple, cogging before vibrations; of those that are left out none.
+    phases: Vec<Option<f64>>,
+}
+
+impl Prediction {
+    /// The manner of this prediction's closed loop; `None` where there is none.
+    #[must_use]
+    pub fn manner(&self) -> Option<Manner> {
+        self.closed_loop.as_ref()?;
+        let Physics { cogging, vibration, .. } = &self.torque.physics;
+        let phase = |ripple: &Ripple| (ripple.amplitude != 0.0).then_some(ripple.phase);
+        Some(Manner {
+            command_speed: self.command_speed,
+            felt: self.added.is_some(),
+            at_start: self.torque.at_start,
+            phases: cogging.iter().chain(vibration).map(phase).collect(),
+        })
+    }
+}
+
+impl Manner {
+    /// Number of ripples that have a phase.
+    #[must_use]
+    pub fn ripples(&self) -> usize {
+        self.phases.iter().flatten().count()
+    }
+
+    /// The position of a recording's first rows, replayed by another machine with as many ripples; each that has a phase is turned
+    /// by some radians. `servo` is what the prediction knew of the servo.
+    ///
+    /// # Errors
+    /// As [`predict`].
+    pub fn replayed(
+        &self,
+        axis: &Axis,
+        (observed, servo): (&Observed, &ByServo),
+        part: Part,
+        turned: &[f64],
+    ) -> Result<Option<Vec<f64>>, String> {
+        let mut physics = Physics::of(axis)?;
+        let mut turned = turned.iter();
+        for (ripple, phase) in physics.cogging.iter_mut().chain(&mut physics.vibration).zip(&self.phases) {
+            match phase {
+                Some(phase) => ripple.phase = phase + turned.next().unwrap_or(&0.0),
+                None => ripple.amplitude = 0.0,
+            }
+        }
+        let torque = TorquePrediction { torque: Vec::new(), at_start: self.at_start, physics, phases_unknown: 0 };
+        let by = usize::from(self.command_speed != CommandSpeed::Central);
+        let added = servo.added[by].as_ref().filter(|_| self.felt).map_or(&[][..], |added| &added.torque);
+        let replayed = replay(axis, observed, &torque, &[], added, self.command_speed, part)?;
+        Ok(replayed.map(|(replayed, _)| replayed.position))
+    }
+}
+
+/// How much of a recording is replayed, and how finely.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Part {
+    /// The first so many rows.
+    pub rows: usize,
+    /// Longest plant step, s.
+    pub step_s: f64,
+}
+
+impl Part {
+    /// All of a recording as usual.
+    #[must_use]
+    pub fn whole(observed: &Observed) -> Self {
+        Self { rows: observed.time_s.len(), step_s: Setup::default().step_s }
+    }
+
+    /// As many rows as a number of plant steps suffices for.
+    #[must_use]
+    pub fn of_steps(axis: &Axis, observed: &Observed, most: usize) -> Self {
+        let whole = Self::whole(observed);
+        let step_s = Physics::of(axis).ok().zip(axis.servo).and_then(|(physics, servo)| {
+            Some(servo.period_s / steps_per_cycle(&physics, &servo, whole.step_s).ok()? as f64)
+        });
+        let rows = step_s.map_or(0.0, |step_s| most as f64 * step_s / observed.period_s);
+        Self { rows: whole.rows.min(rows as usize), ..whole }
+    }
+}
+
 /// A recording replayed at one speed of the command.
 struct Replay<'s> {
     command_speed: CommandSpeed,
@@ -112,12 +203,14 @@ impl<'s> Replay<'s> {
         command_speed: CommandSpeed,
         added: Option<&'s Added>,
     ) -> Result<Option<Self>, String> {
-        let Some((replayed, torque_at_rest)) = replay(axis, observed, torque, rest, &[], command_speed)? else {
+        let whole = Part::whole(observed);
+        let alone = replay(axis, observed, torque, rest, &[], command_speed, whole)?;
+        let Some((replayed, torque_at_rest)) = alone else {
             return Ok(None);
         };
         let mut felt = Self { command_speed, replayed, torque_at_rest, added: None };
         if let Some(added) = added {
-            if let Some((with, _)) = replay(axis, observed, torque, &[], &added.torque, command_speed)? {
+            if let Some((with, _)) = replay(axis, observed, torque, &[], &added.torque, command_speed, whole)? {
                 if error_of(observed, &with) < felt.error(observed) {
                     felt = Self { replayed: with, added: Some(added), ..felt };
                 }
@@ -151,9 +244,10 @@ fn replay(
     rest: &[Range<usize>],
     added: &[f64],
     command_speed: CommandSpeed,
+    part: Part,
 ) -> Result<Option<(ClosedLoop, Vec<f64>)>, String> {
     let (Some(servo), Some(command)) = (&axis.servo, &observed.command) else { return Ok(None) };
-    let time = &observed.time_s;
+    let time = &observed.time_s[..part.rows];
     let (Some(&begin), Some(&end)) = (time.first(), time.last()) else { return Ok(None) };
     let cycles = ((end - begin) / servo.period_s).round() as usize + 1;
     if cycles > 1000 * time.len() {
@@ -164,14 +258,14 @@ fn replay(
             end - begin
         ));
     }
-    let mut command = command_of_cycles(time, command, servo.period_s, cycles).peekable();
+    let mut command = command_of_cycles(time, &command[..part.rows], servo.period_s, cycles).peekable();
     let finite = |value: f64| Some(value).filter(|value| value.is_finite());
     let velocity = finite(observed.motion.velocity(0)).unwrap_or(0.0);
     let measured = observed.position.first().copied().and_then(finite);
     let position = measured.or(command.peek().copied()).unwrap_or(0.0);
     let torque = finite(prediction.at_start).unwrap_or(0.0);
     let start = Start { position, velocity, torque };
-    let setup = Setup { start: Some(start), command_speed, ..Setup::default() };
+    let setup = Setup { step_s: part.step_s, start: Some(start), command_speed, ..Setup::default() };
     // The rows of a recording made once a servo cycle are the cycles themselves.
     let place = |row: usize| {
         let exact = (time[row] - begin) / servo.period_s;

@@ -183,7 +183,10 @@ pub fn simulate_cycles(
 }
 
 /// Whole plant steps in a servo cycle.
-fn steps_per_cycle(physics: &Physics, servo: &Servo, step_s: f64) -> Result<usize, String> {
+///
+/// # Errors
+/// The step is out of range, or the drive so stiff that there would be over a million.
+pub(super) fn steps_per_cycle(physics: &Physics, servo: &Servo, step_s: f64) -> Result<usize, String> {
     if !(step_s >= 1e-8 && step_s <= 1.0) {
         return Err(format!("the plant step of {step_s} s is out of range; give one from 1e-8 s to 1 s"));
     }

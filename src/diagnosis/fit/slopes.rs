@@ -162,7 +162,9 @@ impl Scale {
         }
     }
 
-    fn distance(self, from: f64, to: f64) -> f64 {
+    /// How far apart two values are.
+    #[must_use]
+    pub fn distance(self, from: f64, to: f64) -> f64 {
         match self {
             Scale::Choice => 0.0,
             Scale::Log(..) | Scale::Form(..) => (to / from).ln(),
