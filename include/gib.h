@@ -446,7 +446,7 @@
 #define GIB_ERR_CALIBRATION_ADD (-704)
 
 /**
- * A gain is beyond 0.1 to 10: a sensor's unit or sign is wrong.
+ * A gain is beyond three times `tolerance_ratio` from 1, or beyond 0.1 to 10: a sensor is dead, or its unit or sign is wrong.
  */
 #define GIB_ERR_CALIBRATION_GAIN (-705)
 
@@ -1894,7 +1894,8 @@ typedef struct gib_calibration_config {
      */
     double ball_bar_range_um;
     /**
-     * What the accelerometers' makers promise of their gain, 0.001 to 1 (default 0.1).
+     * What the accelerometers' makers promise of their gain, as a standard deviation, 0.001 to 1 (default 0.1). A gain that is off
+     * by more than three of it is refused.
      */
     double tolerance_ratio;
     /**

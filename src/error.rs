@@ -164,7 +164,7 @@ pub const GIB_ERR_CALIBRATION_SATURATED: i32 = -702;
 pub const GIB_ERR_CALIBRATION_CONDITION: i32 = -703;
 /// An experiment cannot be added: there are eight, or its frequencies are not those of the first.
 pub const GIB_ERR_CALIBRATION_ADD: i32 = -704;
-/// A gain is beyond 0.1 to 10: a sensor's unit or sign is wrong.
+/// A gain is beyond three times `tolerance_ratio` from 1, or beyond 0.1 to 10: a sensor is dead, or its unit or sign is wrong.
 pub const GIB_ERR_CALIBRATION_GAIN: i32 = -705;
 /// The load table is too short, full, or does not rise with the depth beyond its uncertainty.
 pub const GIB_ERR_TILT_TABLE: i32 = -500;
@@ -276,7 +276,10 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_CALIBRATION_SATURATED, "an accelerometer or the ball bar is at its full scale\0"),
     (GIB_ERR_CALIBRATION_CONDITION, "the displacements are too near to opposite phase for the published formula\0"),
     (GIB_ERR_CALIBRATION_ADD, "the experiment cannot be added: too many, or other frequencies\0"),
-    (GIB_ERR_CALIBRATION_GAIN, "a gain is beyond 0.1 to 10: a sensor's unit or sign is wrong\0"),
+    (
+        GIB_ERR_CALIBRATION_GAIN,
+        "a gain is beyond what its makers promise: a sensor is dead, or its unit or sign is wrong\0",
+    ),
     (GIB_ERR_TILT_TABLE, "the load table is too short, full, or does not rise with the depth\0"),
     (GIB_ERR_TILT_CONDITION, "the cut is of another machining condition than the load table\0"),
     (GIB_ERR_TILT_DATA, "too few readings of the load along the path\0"),

@@ -46,7 +46,8 @@ pub struct CalibrationConfig {
     pub acceleration_range_m_s2: f64,
     /// Full scale of the ball bar, 1 to 1000000 µm (default 1000).
     pub ball_bar_range_um: f64,
-    /// What the accelerometers' makers promise of their gain, 0.001 to 1 (default 0.1).
+    /// What the accelerometers' makers promise of their gain, as a standard deviation, 0.001 to 1 (default 0.1). A gain that is off
+    /// by more than three of it is refused.
     pub tolerance_ratio: f64,
     /// Time of measuring at each frequency, 0.1 to 1000 s (default 4), rounded up to 32 periods at least.
     pub measure_s: f64,

@@ -58,6 +58,8 @@ const GROWTH_MIN: f64 = 1.15;
 const PROBES: u32 = 8;
 /// Part of a sensor's range that is used.
 const USED: f64 = 0.7;
+/// Standard deviations that a gain may be off what its makers promise.
+const PROMISED: f64 = 3.0;
 /// A displacement below this many standard deviations shows nothing.
 const SIGNAL: f64 = 5.0;
 /// Magnification beyond which the published formula is refused: 1° of phase would be a sixth of a gain.
@@ -138,6 +140,8 @@ impl Calibration {
         }
         self.plan = plan;
         self.fault = Fault::NONE;
+        // What a run before has found is no result of this one.
+        self.table.count = 0;
         self.point = 0;
         (self.amplitude, self.goal, self.phase_turns) = (0.0, 0.0, 0.0);
         self.output = CalibrationOutput { target_position_mm: self.output.target_position_mm, ..Default::default() };
@@ -194,11 +198,11 @@ impl Calibration {
             self.start = input.position_mm;
             self.output.target_position_mm = input.position_mm;
         }
+        // The way out begins in this very cycle: a command that stood still for one would jerk.
         if let Some(fault) = self.danger(input) {
             self.leave(fault);
-        } else {
-            self.advance(input);
         }
+        self.advance(input);
         if self.busy() {
             self.command();
         }
@@ -379,9 +383,14 @@ impl Calibration {
             let (code, high) = (GIB_ERR_CALIBRATION_CONDITION, CONDITION_MAX);
             return self.leave(Fault { code, field: "condition_ratio\0", value: found.condition, low: 1.0, high });
         }
-        if let Some(bad) = found.gain.iter().find(|g| !(g.0 > 0.0 && g.size() > 0.1 && g.size() < 10.0)) {
+        // A dead sensor leaves the whole ball bar to the other, whose gain then is none that its makers promised.
+        let most = PROMISED * self.plan.tolerance;
+        let (low, high) = ((1.0 - most).max(0.1), (1.0 + most).min(10.0));
+        let sound = |g: &Complex, spread: f64| g.0 > 0.0 && g.size() + spread > low && g.size() - spread < high;
+        let spreads = found.variance.map(|v| 2.0 * (0.5 * v).sqrt());
+        if let Some((bad, _)) = found.gain.iter().zip(spreads).find(|(g, spread)| !sound(g, *spread)) {
             let (code, value) = (GIB_ERR_CALIBRATION_GAIN, bad.size().copysign(bad.0));
-            return self.leave(Fault { code, field: "gain_ratio\0", value, low: 0.1, high: 10.0 });
+            return self.leave(Fault { code, field: "gain_ratio\0", value, low, high });
         }
         let used = if self.plan.published { 1.0 } else { experiments.len() as f64 };
         self.table.point[i] = point(self.plan.tone(i).frequency, &found, last.amplitude, used);
@@ -398,6 +407,7 @@ impl Calibration {
         if self.phase != Phase::Stopping {
             self.fault = fault;
         }
+        self.output.message = self.fault.code;
         if stops(&fault) || self.phase == Phase::Begin {
             // Where the axis is or whether it obeys is not known: nothing is commanded any more.
             self.output.stop_drive = i32::from(stops(&fault) && fault.code != GIB_ERR_DRIVE_FAULT);
@@ -409,7 +419,6 @@ impl Calibration {
 
     fn fail(&mut self) {
         self.amplitude = 0.0;
-        self.output.message = self.fault.code;
         self.enter(Phase::Failed);
         self.output.status = self.fault.code;
     }
