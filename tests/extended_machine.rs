@@ -280,6 +280,33 @@ fn impacts_may_be_a_little_other_than_believed_and_a_clearance_may_not() {
     }
 }
 
+/// A machine that is as believed has no discrepancy, also where its effects act on one another: friction at low speed or at a place
+/// builds up after a reversal as all dry friction does, and a table rests between its flanks. Moves, sweeps included, twice.
+#[test]
+fn effects_that_act_on_one_another_are_believed_together() {
+    let builds_up = |displacement_um: f64| Effect::PreslidingFriction {
+        displacement_um,
+        exponent: 1.0,
+        maxwell_slip: 0.0,
+        micro_damping_s: 0.0,
+    };
+    let sticky = Effect::StribeckFriction { torque: 0.35, velocity_mm_s: 3.0, exponent: 2.0 };
+    let tight = Effect::PositionDependentFriction { centre_mm: 120.0, peak: 0.5, width_mm: 20.0, steepness: 0.0 };
+    let clearance =
+        Effect::Backlash { width_um: 20.0, table_inertia_share: 0.5, table_friction_share: 0.5, contact_hz: 900.0 };
+    let moves = test_moves();
+    let moves = Moves { moves: moves.moves.repeat(2), ..moves };
+    for effects in
+        [vec![builds_up(12.0), sticky], vec![builds_up(30.0), tight], vec![clearance, builds_up(12.0)], vec![clearance]]
+    {
+        let truth = rig(&effects);
+        for (seed, scale) in [(6, true), (7, false)] {
+            let d = judged(&truth, &recorded_by(&truth, &moves, seed, good(0.03), scale));
+            assert_eq!(d.verdict, Verdict::NoDiscrepancy, "{effects:?} {scale}: {:?} {:?}", d.findings, d.unexplained);
+        }
+    }
+}
+
 /// A list of moves for every two causes that leave similar traces is one that `gib simulate` runs, within the stroke and the
 /// speed that the recording had.
 #[test]

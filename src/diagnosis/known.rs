@@ -9,12 +9,14 @@ use super::causes::{Law, Trace, law, table_side};
 use super::frame::Frame;
 use super::many::dot;
 use crate::machine::{Axis, Cause, Effect};
+use crate::plant::physics::Physics;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::VecDeque;
 
 /// How exactly a law holds on a machine, as a share of what it makes near by.
 const LAW_HOLDS: f64 = 1.0 / 30.0;
-/// The same of the torque of a clearance: an impact comes some rows early or late and is harder or softer than flanks without rebound make it.
+/// The same of the torque of a clearance, and of the way that its table goes between the flanks: an impact comes some rows early or
+/// late and is harder or softer than flanks without rebound make it.
 /// On twelve random clearances that were found on one recording and believed on another the rows within [`NEAR_S`] of impacts were
 /// off by a tenth to a fifth of the impact, all others by noise alone.
 const IMPACT_HOLDS: f64 = 0.2;
@@ -40,9 +42,16 @@ impl Known {
         if let Some(apart) = table_side::believed(frame, axis) {
             let flanks = axis.effects.iter().any(|e| e.cause() == Cause::Backlash);
             known.add(frame, &[(&apart, 1.0)], [if flanks { IMPACT_HOLDS } else { LAW_HOLDS }, LAW_HOLDS]);
+            if flanks {
+                known.doubt_crossings(frame, &apart.table);
+            }
         }
         let (steady, periodic): (Vec<&Effect>, Vec<&Effect>) = axis.effects.iter().partition(|e| !has_phase(e));
         for effect in steady {
+            if let (Effect::PreslidingFriction { .. }, Ok(physics)) = (effect, Physics::of(axis)) {
+                known.add(frame, &[(&build_up(frame, &physics), 1.0)], [LAW_HOLDS; 2]);
+                continue;
+            }
             let Some((shape, coefficients)) = by_its_law(frame, effect) else { continue };
             let regressors = regressors(frame, effect, shape);
             known.add(frame, &regressors.iter().zip(coefficients).collect::<Vec<_>>(), [LAW_HOLDS; 2]);
@@ -67,27 +76,42 @@ impl Known {
                 own.iter_mut().zip(of(trace)).for_each(|(own, value)| *own += factor * value);
             }
             sum.iter_mut().zip(&own).for_each(|(sum, own)| *sum += own);
-            let reach = (NEAR_S / frame.columns.period_s) as usize;
-            let most = largest_near(&frame.kept, reach, &own);
+            own.iter_mut().for_each(|own| *own = own.abs());
+            let most = largest_near(&frame.kept, reach(frame), &own);
             doubt.iter_mut().zip(most).for_each(|(doubt, most)| *doubt = doubt.hypot(holds * most));
         };
         channel(|t| &t.torque, in_torque, &mut self.trace.torque, &mut self.doubt.torque);
         channel(|t| &t.table, in_table, &mut self.trace.table, &mut self.doubt.table);
     }
+
+    /// Doubts where a table is between the flanks, by how far it goes near by and may be from either: how one that rests between them
+    /// came there nobody knows.
+    fn doubt_crossings(&mut self, frame: &Frame, table: &[f64]) {
+        let back: Vec<f64> = table.iter().map(|x| -x).collect();
+        let [most, least] = [table, &back].map(|values| largest_near(&frame.kept, reach(frame), values));
+        let flank = table.iter().copied().fold(0.0, f64::max);
+        let between = table.iter().map(|x| 2.0 * (flank - x.abs()));
+        let ways = most.iter().zip(&least).zip(between).map(|((most, least), between)| between.max(most + least));
+        self.doubt.table.iter_mut().zip(ways).for_each(|(doubt, way)| *doubt = doubt.hypot(IMPACT_HOLDS * way));
+    }
 }
 
-/// The largest magnitude among the judged rows that are no more than `reach` rows from each of them.
+/// [`NEAR_S`] in rows.
+fn reach(frame: &Frame) -> usize {
+    (NEAR_S / frame.columns.period_s) as usize
+}
+
+/// The largest among the judged rows that are no more than `reach` rows from each of them.
 fn largest_near(kept: &[usize], reach: usize, values: &[f64]) -> Vec<f64> {
     // Places that may still hold the largest of some row ahead, in order: each is larger than all after it.
     let mut candidates: VecDeque<usize> = VecDeque::new();
     let mut end = 0;
     let near = |&row: &usize| {
         while end < values.len() && kept[end] <= row + reach {
-            let size = values[end].abs();
-            while candidates.back().is_some_and(|&last| values[last].abs() <= size) {
+            while candidates.back().is_some_and(|&last| values[last] <= values[end]) {
                 candidates.pop_back();
             }
-            if !size.is_nan() {
+            if !values[end].is_nan() {
                 candidates.push_back(end);
             }
             end += 1;
@@ -95,9 +119,25 @@ fn largest_near(kept: &[usize], reach: usize, values: &[f64]) -> Vec<f64> {
         while candidates.front().is_some_and(|&first| kept[first] + reach < row) {
             candidates.pop_front();
         }
-        candidates.front().map_or(0.0, |&first| values[first].abs())
+        candidates.front().map_or(0.0, |&first| values[first])
     };
     kept.iter().take(values.len()).map(near).collect()
+}
+
+/// What friction that builds up is short of friction that is there at once. By the simulation's law: all of its level builds up, with
+/// what low speed, a place or the time adds to it.
+fn build_up(frame: &Frame, physics: &Physics) -> Trace {
+    let (x, scale) = (&frame.columns.position, physics.motor_per_load);
+    let mut short = vec![0.0; x.len()];
+    for stretch in &frame.columns.stretches {
+        let mut friction = physics.bristle(1.0);
+        for i in stretch.clone().skip(1) {
+            let level = physics.friction_level(x[i], frame.v[i], frame.seconds(i));
+            let dry = friction.moved((x[i] - x[i - 1]) * scale, level) + friction.damped(frame.v[i] * scale, level);
+            short[i] = dry - level * frame.direction[i];
+        }
+    }
+    Trace::torque(frame.judged(&short))
 }
 
 fn regressors(frame: &Frame, effect: &Effect, shape: Vec<f64>) -> Vec<Trace> {
@@ -195,7 +235,8 @@ mod tests {
             assert_eq!(found.len(), values.len());
             for (row, found) in kept.iter().zip(found) {
                 let near = kept.iter().zip(&values).filter(|(other, _)| other.abs_diff(*row) <= reach);
-                assert_eq!(near.fold(0.0f64, |most, (_, value)| most.max(value.abs())), found);
+                let most = near.fold(f64::NEG_INFINITY, |most, (_, value)| most.max(*value));
+                assert_eq!(if most.is_finite() { most } else { 0.0 }, found);
             }
         }
     }
