@@ -27,8 +27,8 @@ const BLOCKS: usize = 24;
 /// Plant steps of a replay at most, of a rigid axis and of two masses, which take as long for a third of them: 40 s, and some ten
 /// seconds in which reversals at several speeds have been.
 const MOST_STEPS: [usize; 2] = [1_600_000, 500_000];
-/// A derivative needs no finer plant steps than this many of the usual ones.
-const COARSER: f64 = 4.0;
+/// What moved numbers change needs no finer plant steps than this many of the usual ones.
+const COARSER: f64 = 8.0;
 /// Replays at most after those of the start and of the derivatives.
 const MOST_TRIALS: usize = 3;
 /// Share of the error that the first trial, and a further one, must promise to take off.
@@ -106,8 +106,10 @@ pub fn refined(bench: &Bench, held_out: &HeldOut, judged: &Judged, watch: &Watch
         if said.promised > (1.0 - WORTH[trial.min(1)]) * size(&least) {
             break;
         }
-        let Some(position) = replay(&said.place, fine) else { break };
+        let Some(there) = replay(&said.place, coarse) else { break };
         watch.at(0.97 + 0.01 * trial as f64, STAGE)?;
+        let position: Vec<f64> =
+            start.iter().zip(there.iter().zip(middle)).map(|(start, (there, middle))| start + there - middle).collect();
         let next = error(&position);
         if size(&next) >= size(&least) {
             break;
