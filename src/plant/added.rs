@@ -43,10 +43,10 @@ const ENOUGH: usize = 1 << 14;
 const NORMAL_MEDIAN: f64 = 0.6745;
 
 /// Contiguous blocks over which another speed of the command must come closer, and its mean gain over the deviation of that. Most of
-/// the gain lies in the few blocks with the rapids, so that the ratio is never large; who takes the other speed lets the position
-/// confirm it.
+/// the gain lies in the few blocks with the rapids, so that the ratio is never far from ±3 even where there is no doubt, and noise of
+/// the torque brings it down; who takes the other speed lets the position confirm it, which tells the two apart by far.
 const BLOCKS: usize = 24;
-const LIKELY: f64 = 2.0;
+const LIKELY: f64 = 1.0;
 
 /// What a recording says of the servo by its law alone: the same of every machine with that drive and servo.
 #[derive(Debug)]
