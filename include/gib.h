@@ -3331,8 +3331,8 @@ typedef struct gib_tilt_config {
      */
     double time_limit_s;
     /**
-     * Expected wear (k = 1): share by which the apparent depth grows in a metre of cut, 0.00001 to 10 (default 0.01). Only
-     * where the passes cannot tell wear from tilt; it then enters the uncertainty.
+     * Expected wear (k = 1): share by which the apparent depth grows in a metre of cut, 0.00001 to 10 (default 0.01).
+     * Where the passes cannot tell wear from tilt it enters the uncertainty; where they can, ten times it is one more measurement.
      */
     double wear_ratio_m;
     /**

@@ -85,8 +85,8 @@ pub struct TiltConfig {
     pub block_s: f64,
     /// Longest time in the cut, 1 to 20000 s (default 200). Beyond 2000 blocks, blocks get longer.
     pub time_limit_s: f64,
-    /// Expected wear (k = 1): share by which the apparent depth grows in a metre of cut, 0.00001 to 10 (default 0.01). Only
-    /// where the passes cannot tell wear from tilt; it then enters the uncertainty.
+    /// Expected wear (k = 1): share by which the apparent depth grows in a metre of cut, 0.00001 to 10 (default 0.01).
+    /// Where the passes cannot tell wear from tilt it enters the uncertainty; where they can, ten times it is one more measurement.
     pub wear_ratio_m: f64,
     /// A tilt up to this is left alone, 0 to 45° (default 0).
     pub band_deg: f64,

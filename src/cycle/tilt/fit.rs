@@ -7,8 +7,8 @@
 //! entry, exit and chips end with no weight (Holland and Welsch 1977; variance after Huber 1981, 7.6).
 //!
 //! The wear w is fitted where the passes can tell it from tilt: where at least a tenth of the variance of s is not explained
-//! by position, as after a reversed or repeated pass. Where not, w = 0 is assumed with the standard uncertainty that the
-//! configuration expects. Residuals that follow each other widen the uncertainty by (1 + ρ)/(1 − ρ), ρ their correlation; few blocks
+//! by position, as after a reversed or repeated pass; 0 ± ten times what the configuration expects then counts as one more
+//! measurement. Where not, w = 0 is assumed with the standard uncertainty that the configuration expects. Residuals that follow each other widen the uncertainty by (1 + ρ)/(1 − ρ), ρ their correlation; few blocks
 //! widen it as Student's t does. The unknowns take their part of both: of n residuals of least absolute deviations as many are 0
 //! as there are unknowns, so the median is that of the others, and their correlation comes out too low by unknowns/n.
 //!
@@ -25,6 +25,8 @@ const SLICE: usize = 12;
 pub const FEWEST: usize = 12;
 /// Passes of least absolute deviations, and of the biweight with its first and with its second scale.
 const PASSES: [u32; 3] = [8, 13, 18];
+/// Share of the mean absolute residual below which blocks weigh no more.
+const NEAREST: f64 = 0.1;
 /// Tukey's constant.
 const TUKEY: f64 = 4.685;
 /// Normal σ for a median of absolute residuals of 1.
@@ -33,6 +35,8 @@ const SIGMA_OF_MEDIAN: f64 = 1.4826;
 const NARROW: f64 = 0.03;
 /// Share of the variance of the cut length that position must leave unexplained.
 const SEPARABLE: f64 = 0.1;
+/// Times what is expected that the wear may well be where it is told from tilt: on a short path an entry may look like more.
+const BEYOND: f64 = 10.0;
 /// Student's t over 2 where the normal distribution has 2, by powers of 1/freedom: (z² + 1)/4 and (5z⁴ + 16z² + 3)/96 at z = 2.
 const STUDENT: [f64; 2] = [1.25, 1.53];
 /// Halvings that find a median.
@@ -90,6 +94,9 @@ pub struct Fit {
     pub deviation: f64,
     /// Blocks without weight.
     pub rejected: u32,
+    /// Most of them in a row, and those in the present row.
+    pub in_a_row: u32,
+    row: u32,
     /// For the two points: the first block, and the block of the first pass that is farthest from it.
     pub ends: [Block; 2],
     /// Square of their distance; below 0 without blocks.
@@ -124,6 +131,8 @@ impl Fit {
         covariance: [[0.0; 4]; 4],
         deviation: 0.0,
         rejected: 0,
+        in_a_row: 0,
+        row: 0,
         ends: [Block { x: 0.0, y: 0.0, value: 0.0, gain: 0.0, load: 0.0, cut: 0.0, along: 0.0, residual: 0.0 }; 2],
         apart: -1.0,
         first_pass: 0.0,
@@ -216,6 +225,8 @@ impl Fit {
                 let psi = inside * inside * r;
                 let counts = if inside > 0.0 { 1.0 } else { 0.0 };
                 self.rejected += u32::from(inside == 0.0);
+                self.row = if inside == 0.0 { self.row + 1 } else { 0 };
+                self.in_a_row = self.in_a_row.max(self.row);
                 let slope = counts * inside * (1.0 - 5.0 * t * t);
                 let news = [0.0, counts, inside * inside, psi, psi * psi, slope, psi * self.last];
                 self.sums.iter_mut().zip(news).for_each(|(sum, value)| *sum += value);
@@ -256,11 +267,14 @@ impl Fit {
         }
         let robust = self.pass > PASSES[0];
         let last = self.pass == PASSES[2];
-        if !self.separable {
-            // What is expected of the wear, as if it had been measured; before there is a scale, that there is none.
-            let prior = if robust { self.noise / (self.wear_prior * self.wear_prior) } else { 1e30 };
-            self.normal[3][3] += prior;
-        }
+        // What is expected of the wear, as if it had been measured; before there is a scale, that there is none.
+        let expected = if self.separable { BEYOND * self.wear_prior } else { self.wear_prior };
+        self.normal[3][3] += match robust {
+            true => self.noise / (expected * expected),
+            // Of absolute deviations, whose mean is to be had from the bound of the weights.
+            false if self.separable => self.scale / (NEAREST * expected * expected),
+            false => 1e30,
+        };
         let factors = self.factors();
         if robust {
             self.scatter();
@@ -272,7 +286,7 @@ impl Fit {
         self.pass += 1;
         let mean = self.sums[0] / n;
         // Residuals of the beta before; a part of them bounds the weights of the nearest blocks.
-        self.scale = if self.pass <= PASSES[0] { floor(0.1 * mean, self.beta[0]) } else { self.scale };
+        self.scale = if self.pass <= PASSES[0] { floor(NEAREST * mean, self.beta[0]) } else { self.scale };
         if self.pass == PASSES[0] + 1 || self.pass == PASSES[1] + 1 {
             self.median = [0.0, self.sums[0]];
             self.below = 0;
@@ -291,7 +305,7 @@ impl Fit {
         self.right = [0.0; 4];
         self.sums = [0.0; 7];
         self.last = 0.0;
-        self.rejected = 0;
+        (self.rejected, self.in_a_row, self.row) = (0, 0, 0);
     }
 
     fn middle(&self) -> f64 {
@@ -350,139 +364,4 @@ fn floor(scale: f64, level: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A small generator of its own: sums of uniform numbers, near normal, σ = 1.
-    struct Noise(u64);
-
-    impl Noise {
-        fn uniform(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1u64 << 53) as f64
-        }
-        fn normal(&mut self) -> f64 {
-            (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-        }
-    }
-
-    /// Passes of 200 blocks over 100 mm, forth and back, with a step aside between; depth from a law.
-    fn passes(count: usize, aside: f64, depth: impl Fn(f64, f64, f64) -> f64) -> Vec<Block> {
-        (0..200 * count)
-            .map(|i| {
-                let (pass, k) = (i / 200, i % 200);
-                let x = 0.5 * if pass % 2 == 0 { k as f64 } else { 199.0 - k as f64 };
-                let (y, cut) = (aside * pass as f64, 5e-4 * i as f64);
-                Block { x, y, value: depth(x, y, cut), gain: 7.0, cut, ..Block::default() }
-            })
-            .collect()
-    }
-
-    fn fitted(blocks: &mut [Block]) -> Fit {
-        let mut fit = Fit::REST;
-        fit.begin(0.02);
-        let mut slices = 0;
-        while !fit.step(blocks) {
-            slices += 1;
-            assert!(slices < 100_000);
-        }
-        fit
-    }
-
-    /// Slopes along x and y.
-    fn slopes(fit: &Fit) -> [f64; 2] {
-        let [c, s] = fit.along;
-        [c * fit.beta[1] - s * fit.beta[2], s * fit.beta[1] + c * fit.beta[2]]
-    }
-
-    #[test]
-    fn an_exact_plane_with_wear_comes_out_exactly() {
-        let mut blocks = passes(4, 20.0, |x, y, cut| (3.0 + 0.01 * x - 0.004 * y) * (1.0 + 0.05 * cut));
-        // The steps aside go one way with time: only cuts back over the same y tell wear from a slope along y.
-        let back: Vec<Block> = passes(4, 20.0, |_, _, _| 0.0)
-            .into_iter()
-            .map(|b| {
-                let (y, cut) = (60.0 - b.y, b.cut + 0.4);
-                Block { y, cut, value: (3.0 + 0.01 * b.x - 0.004 * y) * (1.0 + 0.05 * cut), ..b }
-            })
-            .collect();
-        blocks.extend(back);
-        let fit = fitted(&mut blocks);
-        let [gx, gy] = slopes(&fit);
-        assert!((gx - 0.01).abs() < 1e-9 && (gy + 0.004).abs() < 1e-9 && (fit.beta[3] - 0.05).abs() < 1e-7, "{fit:?}");
-        assert!(fit.planar && fit.separable);
-    }
-
-    #[test]
-    fn a_line_in_any_direction() {
-        for degrees in [0.0f64, 30.0, 90.0, 135.0, 179.0] {
-            let (s, c) = degrees.to_radians().sin_cos();
-            let mut blocks = passes(2, 0.0, |x, _, _| 2.0 - 0.02 * x);
-            blocks.iter_mut().for_each(|b| (b.x, b.y) = (b.x * c, b.x * s));
-            let fit = fitted(&mut blocks);
-            assert!(!fit.planar && fit.separable);
-            let along = fit.beta[1] * (fit.along[0] * c + fit.along[1] * s).signum();
-            assert!((along + 0.02).abs() < 1e-9, "{degrees}: {fit:?}");
-        }
-    }
-
-    #[test]
-    fn entry_exit_and_chips_do_not_move_it() {
-        let mut noise = Noise(7);
-        let mut blocks = passes(3, 10.0, |x, y, _| 3.0 + 0.01 * x + 0.002 * y);
-        for (i, b) in blocks.iter_mut().enumerate() {
-            let k = i % 200;
-            b.value += 0.02 * noise.normal();
-            // A tenth of each pass in entry, seven hundredths in exit, chips here and there.
-            b.value -= if k < 20 { 0.12 * (20 - k) as f64 } else { 0.0 };
-            b.value -= if k > 185 { 0.15 * (k - 185) as f64 } else { 0.0 };
-            b.value += if noise.uniform() < 0.03 { 1.5 } else { 0.0 };
-        }
-        let fit = fitted(&mut blocks);
-        let [gx, gy] = slopes(&fit);
-        assert!((gx - 0.01).abs() < 2e-4 && (gy - 0.002).abs() < 4e-4, "{gx} {gy}");
-        assert!(fit.rejected > 80 && fit.rejected < 140, "{}", fit.rejected);
-    }
-
-    /// One pass in one direction cannot tell wear from tilt: the uncertainty says so. Back again, and it can.
-    #[test]
-    fn wear_is_told_apart_only_where_the_passes_can() {
-        let wear = |x: f64, _: f64, cut: f64| (3.0 + 0.005 * x) * (1.0 + 0.04 * cut);
-        let fit = fitted(&mut passes(1, 0.0, wear));
-        assert!(!fit.separable && fit.beta[3].abs() < 1e-6);
-        // 4 % of 3 mm a metre look like a slope of 1.2e-4, and the product adds 2e-5; expected are 2 % (k = 1), 7e-5.
-        let std = fit.covariance[1][1].sqrt();
-        assert!((slopes(&fit)[0] - 0.005_14).abs() < 1e-6, "{:?}", slopes(&fit));
-        assert!(std > 6.9e-5 && std < 7.4e-5, "{std}");
-        let fit = fitted(&mut passes(2, 0.0, wear));
-        assert!(fit.separable && (slopes(&fit)[0] - 0.005).abs() < 1e-8 && (fit.beta[3] - 0.04).abs() < 1e-6);
-    }
-
-    /// The stated standard deviations are those of the scatter, with and without outliers, and of unknown wear.
-    #[test]
-    fn uncertainty_is_that_of_the_scatter() {
-        let mut noise = Noise(20);
-        for (chips, slow) in [(0.0, 0.0), (0.05, 0.0), (0.0, 0.6)] {
-            let (mut squares, mut stated, mut covered) = (0.0, 0.0, 0);
-            let runs = 200;
-            for _ in 0..runs {
-                let mut last = 0.0;
-                let wear = 0.02 * noise.normal();
-                let mut blocks = passes(1, 0.0, |x, _, cut| (3.0 + 0.01 * x) * (1.0 + wear * cut));
-                for b in &mut blocks {
-                    last = slow * last + 1e-3 * noise.normal();
-                    b.value += last + if noise.uniform() < chips { 1.0 } else { 0.0 };
-                }
-                let fit = fitted(&mut blocks);
-                let (error, std) = (slopes(&fit)[0] - 0.01, fit.covariance[1][1].sqrt());
-                squares += error * error / f64::from(runs);
-                stated += std * std / f64::from(runs);
-                covered += u32::from(error.abs() <= 2.0 * std);
-            }
-            let ratio = (stated / squares).sqrt();
-            println!("chips {chips}, correlation {slow}: stated/found {ratio:.2}, covered {covered} of {runs}");
-            assert!(ratio > 0.75 && ratio < 1.35, "{ratio}");
-            assert!(covered >= 180 && covered <= 199, "{covered}");
-        }
-    }
-}
+mod tests;

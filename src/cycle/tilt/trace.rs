@@ -52,9 +52,11 @@ pub struct Trace {
     cut: f64,
     along: f64,
     last: Option<([f64; 2], f64)>,
-    /// Load of the last block that counted, and how many have had that of the one before.
+    /// Load of the last block that counted, how many have had that of the one before, and whether at more loads than one.
     load: f64,
     repeated: u32,
+    rest: Option<f64>,
+    grid: bool,
     /// Blocks at a speed that no tool in the cut has.
     jumped: u32,
     /// Way in the present pass behind which its blocks do not count, once it has ended.
@@ -76,6 +78,8 @@ impl Default for Trace {
             last: None,
             load: 0.0,
             repeated: 0,
+            rest: None,
+            grid: false,
             jumped: 0,
             exit: None,
             counts: Counts::default(),
@@ -92,6 +96,7 @@ impl Trace {
         self.cut = 0.0;
         self.exit = None;
         (self.load, self.repeated, self.jumped) = (f64::INFINITY, 0, 0);
+        (self.rest, self.grid) = (None, false);
         self.counts = Counts::default();
         self.begin_pass();
     }
@@ -150,8 +155,11 @@ impl Trace {
             self.counts.aliased += 1;
             return false;
         }
-        // The sums of a constant differ by their rounding.
-        self.repeated += u32::from((mean.load - self.load).abs() <= 1e-9 * mean.load);
+        if same(mean.load, self.load) {
+            self.repeated += 1;
+            self.grid |= self.rest.is_some_and(|rest| !same(mean.load, rest));
+            self.rest = Some(mean.load);
+        }
         self.load = mean.load;
         let read = if teach { Some((mean.load, 1.0)) } else { plan.inverse.curved(mean.load) };
         let Some((value, gain)) = read else {
@@ -178,6 +186,12 @@ impl Trace {
         self.repeated
     }
 
+    /// Whether they were so at more loads than one, as those of a coarse grid are and those of a sensor that is stuck are not.
+    #[must_use]
+    pub fn on_grid(&self) -> bool {
+        self.grid
+    }
+
     /// The blocks that count.
     #[must_use]
     pub fn blocks(&self) -> &[Block] {
@@ -194,6 +208,11 @@ impl Trace {
     pub fn origin(&self) -> [f64; 2] {
         self.origin
     }
+}
+
+/// Whether two means are of one constant, whose sums differ by their rounding.
+fn same(load: f64, other: f64) -> bool {
+    (load - other).abs() <= 1e-9 * load
 }
 
 #[cfg(test)]
@@ -235,5 +254,19 @@ mod tests {
         assert!(!trace.take(&plan, &Mean { aliased: true, cycles: 150.0, ..mean(3) }, true));
         assert!(!trace.take(&plan, &Mean { speed: f64::NAN, ..mean(4) }, true));
         assert_eq!(trace.counts, Counts { off_condition: 3, outside: 0, aliased: 1 });
+    }
+
+    /// On a grid it rests at several values; a sensor that is stuck, or at its limit, rests at one.
+    #[test]
+    fn a_load_that_rests_is_known() {
+        let rests = |load: fn(usize) -> f64| {
+            let (plan, mut trace) = (plan(0.0), Box::new(Trace::default()));
+            trace.clear([0.0; 2]);
+            (0..40).for_each(|i| _ = trace.take(&plan, &Mean { load: load(i), ..mean(i) }, true));
+            (trace.repeated(), trace.on_grid())
+        };
+        assert_eq!(rests(|i| 20.0 + 0.01 * (i as f64).sin()), (0, false));
+        assert_eq!(rests(|i| 20.0 + 0.01 * (i.min(25) as f64).sin()), (14, false));
+        assert_eq!(rests(|i| 20.0 + (i / 10) as f64), (36, true));
     }
 }

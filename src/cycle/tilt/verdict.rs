@@ -125,8 +125,13 @@ pub fn trusted(plan: &Plan, trace: &Trace, fit: &Fit) -> Result<(), Fault> {
         at_most(GIB_ERR_TILT_CONDITION, "off_condition\0", off_condition, (used + off_condition) / 3)?;
     }
     at_most(GIB_ERR_TILT_RANGE, "load\0", outside, (used + outside) / 3)?;
-    // A load that never changes is none. One on a coarse grid may rest for long; the waves of a current do not come out the same twice.
-    let resting = if plan.squared > 0.0 { used.max(FEWEST as u32) / 3 } else { used.saturating_sub(2) };
+    // A load that never changes is none, and one that rests at one value alone is stuck there, at its limit, or too coarse for this
+    // plane. One on a grid may rest at several for long; the waves of a current do not come out the same twice.
+    let resting = match trace.on_grid() {
+        false => used.max(FEWEST as u32) / 20,
+        true if plan.squared > 0.0 => used.max(FEWEST as u32) / 3,
+        true => used,
+    };
     at_most(GIB_ERR_TILT_DATA, "load\0", trace.repeated(), resting)?;
     // One at its limit says the same wherever it is there; what is not is then thrown out, and the rest has no scatter.
     at_most(GIB_ERR_TILT_DATA, "load\0", if fit.exact() { rejected } else { 0 }, 0)?;
@@ -141,7 +146,9 @@ pub fn trusted(plan: &Plan, trace: &Trace, fit: &Fit) -> Result<(), Fault> {
             high: super::trace::BLOCKS as f64,
         });
     }
-    at_most(GIB_ERR_TILT_SHAPE, "rejected\0", rejected, used * 2 / 5)
+    at_most(GIB_ERR_TILT_SHAPE, "rejected\0", rejected, used * 2 / 5)?;
+    // Entries and exits that are so many come in two rows at least: a longer one is a load that jumped, and stayed there.
+    at_most(GIB_ERR_TILT_SHAPE, "rejected\0", fit.in_a_row, used / 5)
 }
 
 /// Slopes along x and y with their covariance, whichever method.
@@ -168,7 +175,9 @@ pub fn report(plan: &Plan, trace: &Trace, fit: &Fit) -> TiltReport {
     let steep = (gx * gx + gy * gy).sqrt();
     let (p, q) = if steep > 0.0 { (gx / steep, gy / steep) } else { (c, s) };
     let along = p * p * slope.xx + 2.0 * p * q * slope.xy + q * q * slope.yy;
-    let sideways = q * q * slope.xx - 2.0 * p * q * slope.xy + p * p * slope.yy;
+    let sideways = (q * q * slope.xx - 2.0 * p * q * slope.xy + p * p * slope.yy).max(0.0);
+    // What the slope may have across makes it steeper by the Pythagorean rule: little beside a large one, in full where there is none.
+    let steeper = 0.5 * ((steep * steep + 4.0 * sideways).sqrt() - steep);
     let reach = fit.extent().map(|[low, high]| high - low);
     let change = gx.abs() * reach[0] + gy.abs() * reach[1];
     let depth = fit.at(fit.centre[0], fit.centre[1]);
@@ -183,7 +192,7 @@ pub fn report(plan: &Plan, trace: &Trace, fit: &Fit) -> TiltReport {
     let separated = fit.separable && !plan.two_point;
     let mut report = TiltReport {
         tilt_deg: deg(steep),
-        uncertainty_deg: wide(along.max(if steep > 0.0 { 0.0 } else { sideways }) + scaled(steep), steep),
+        uncertainty_deg: wide(along + steeper * steeper + scaled(steep), steep),
         about_x_deg: deg(gy),
         about_x_uncertainty_deg: uncertainty(slope.yy, gy, GIB_TILT_ABOUT_X),
         about_y_deg: -deg(gx),
