@@ -244,6 +244,32 @@ static void abort_at_every_cycle(void **state)
     free(copy);
 }
 
+/* From this cycle on the table stands turned: by less than counts, by more, or about an axis that is not gib's. In the air, and where
+ * the offsets are in force or go out, nobody asks; a later cut, the answer to the warning and the ramp in do. */
+static void a_table_that_turns(void **state)
+{
+    (void)state;
+    void *memory = aligned();
+    for (int phase = GIB_TILT_MEASURING; phase <= GIB_TILT_RAMP_OFF; phase++) {
+        for (int kind = 0; kind < 3; kind++) {
+            run r;
+            gib_error_detail detail;
+            assert_true(reach(&r, memory, phase, phase == GIB_TILT_MEASURING ? 2000 : 13));
+            int matters = kind == 1 && phase <= GIB_TILT_RAMP_ON, cycles = 0;
+            while (r.status == GIB_BUSY && cycles++ < 100000) {
+                gib_tilt_input in = sense(&r);
+                in.flags |= r.kernel.out.phase == GIB_TILT_ACTIVE && phase != GIB_TILT_RAMP_OFF ? GIB_TILT_INPUT_OFF : 0u;
+                in.rotary_deg[kind == 2 ? 2 : 1] += kind == 0 ? 0.009 : -0.011;
+                step(&r, &in);
+            }
+            gib_tilt_last_error(r.kernel.gib, &detail);
+            assert_int_equal(r.status, matters ? GIB_ERR_TILT_CONDITION : GIB_DONE);
+            assert_string_equal(detail.field, matters ? "rotary_deg" : "");
+        }
+    }
+    free(memory);
+}
+
 /* Taken out in the middle of the ramp in: a ramp too, and no error. */
 static void off_at_every_moment(void **state)
 {
@@ -397,7 +423,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_fault_in_every_phase), cmocka_unit_test(abort_at_every_cycle),
-        cmocka_unit_test(off_at_every_moment),        cmocka_unit_test(a_position_that_jumps),
+        cmocka_unit_test(a_table_that_turns),         cmocka_unit_test(off_at_every_moment),
+        cmocka_unit_test(a_position_that_jumps),
         cmocka_unit_test(wrong_calls_are_refused),    cmocka_unit_test(bad_configurations_are_named),
     };
     return cmocka_run_group_tests(tests, prepare, NULL);

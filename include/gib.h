@@ -456,7 +456,7 @@
 #define GIB_ERR_TILT_TABLE (-500)
 
 /**
- * The cut is of another machining condition than the load table.
+ * The cut is of another machining condition than the load table, or a rotary axis stands elsewhere than in the first cut.
  */
 #define GIB_ERR_TILT_CONDITION (-501)
 
@@ -3441,7 +3441,8 @@ typedef struct gib_tilt_input {
      */
     double position_mm[3];
     /**
-     * Commanded angles a b c without gib's offsets, °; 0 for an axis that is not there.
+     * Commanded angles a b c without gib's offsets, °; 0 for an axis that is not there. One that is configured stays within 0.01
+     * of the first cut until the offsets are out again: `GIB_ERR_TILT_CONDITION` in later cuts and until the offsets are in.
      */
     double rotary_deg[3];
     /**

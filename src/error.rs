@@ -168,7 +168,7 @@ pub const GIB_ERR_CALIBRATION_ADD: i32 = -704;
 pub const GIB_ERR_CALIBRATION_GAIN: i32 = -705;
 /// The load table is too short, full, or does not rise with the depth beyond its uncertainty.
 pub const GIB_ERR_TILT_TABLE: i32 = -500;
-/// The cut is of another machining condition than the load table.
+/// The cut is of another machining condition than the load table, or a rotary axis stands elsewhere than in the first cut.
 pub const GIB_ERR_TILT_CONDITION: i32 = -501;
 /// Too few readings of the load along the path.
 pub const GIB_ERR_TILT_DATA: i32 = -502;
@@ -281,7 +281,7 @@ const TEXTS: &[(i32, &str)] = &[
         "a gain is beyond what its makers promise: a sensor is dead, or its unit or sign is wrong\0",
     ),
     (GIB_ERR_TILT_TABLE, "the load table is too short, full, or does not rise with the depth\0"),
-    (GIB_ERR_TILT_CONDITION, "the cut is of another machining condition than the load table\0"),
+    (GIB_ERR_TILT_CONDITION, "another machining condition than the load table's, or a rotary axis that was turned\0"),
     (GIB_ERR_TILT_DATA, "too few readings of the load along the path\0"),
     (GIB_ERR_TILT_RANGE, "the load lies outside the table\0"),
     (GIB_ERR_TILT_SIZE, "the offsets that undo the tilt are larger than allowed\0"),

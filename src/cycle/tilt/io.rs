@@ -32,7 +32,8 @@ pub const GIB_TILT_INPUT_OFF: u32 = 16;
 pub struct TiltInput {
     /// Commanded position x y z of the tool tip in machine coordinates, without gib's offsets, mm.
     pub position_mm: [f64; 3],
-    /// Commanded angles a b c without gib's offsets, °; 0 for an axis that is not there.
+    /// Commanded angles a b c without gib's offsets, °; 0 for an axis that is not there. One that is configured stays within 0.01
+    /// of the first cut until the offsets are out again: `GIB_ERR_TILT_CONDITION` in later cuts and until the offsets are in.
     pub rotary_deg: [f64; 3],
     /// Spindle load: current of one phase, rectified or not, A; or DC load, %.
     pub load: f64,

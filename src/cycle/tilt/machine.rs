@@ -9,6 +9,7 @@
 //! `leave` is the one door out: it takes every offset out within the bounds of speed and acceleration. Until the operator
 //! has accepted the warning no offset is put out. Offsets in force end by `GIB_TILT_INPUT_OFF`, an abort or a fault.
 
+mod danger;
 mod quick;
 
 use super::config::*;
@@ -22,7 +23,8 @@ use super::trace::Trace;
 use super::verdict::*;
 use crate::cycle::backlash::io::{GIB_INPUT_ABORT, GIB_INPUT_FAULT};
 use crate::error::*;
-use quick::{HUGE, Usual, sound};
+use danger::danger;
+use quick::Usual;
 use wide::f64x2;
 
 /// Where the machine is. Each comment says what ends the state.
@@ -210,6 +212,9 @@ impl Tilt {
     fn measure(&mut self, input: &TiltInput) {
         self.trace.leave();
         let cutting = input.flags & GIB_TILT_INPUT_CUTTING != 0;
+        if let Some(fault) = if cutting && self.begun { self.turned(input) } else { None } {
+            return self.leave(fault);
+        }
         if cutting && !self.cutting {
             self.begin_pass(input);
         } else if cutting {
@@ -326,6 +331,9 @@ impl Tilt {
             self.report.decision = GIB_TILT_DECLINED;
             self.enter(Phase::Done);
         } else if input.acknowledged_id == self.output.request_id {
+            if let Some(fault) = self.turned(input) {
+                return self.leave(fault);
+            }
             let time = |bounds: &super::follow::Bounds| {
                 bounds.most / bounds.speed
                     + 4.0 * bounds.speed / bounds.acceleration
@@ -390,6 +398,13 @@ impl Tilt {
         if input.flags & GIB_TILT_INPUT_OFF != 0 {
             return self.take_out();
         }
+        if let Some(fault) = self.turned(input) {
+            self.leave(fault);
+            if self.phase == Phase::RampOff {
+                self.ramp_off();
+            }
+            return;
+        }
         if self.bring_in(input) {
             self.enter(Phase::Active);
         } else if self.left == 0 {
@@ -452,37 +467,4 @@ impl Tilt {
             _ => GIB_BUSY,
         };
     }
-}
-
-/// What in this cycle's input must end the run.
-fn danger(input: &TiltInput) -> Option<Fault> {
-    const KNOWN: u32 = GIB_TILT_INPUT_CUTTING | GIB_TILT_INPUT_END | GIB_TILT_INPUT_OFF;
-    if input.flags & GIB_INPUT_ABORT != 0 {
-        return Some(Fault::of(GIB_ERR_ABORTED));
-    }
-    if input.flags & !(KNOWN | GIB_INPUT_ABORT) != 0 {
-        let field = if input.flags & GIB_INPUT_FAULT != 0 { "\0" } else { "flags\0" };
-        return Some(Fault { code: GIB_ERR_DRIVE_FAULT, field, value: f64::from(input.flags), ..Fault::NONE });
-    }
-    if sound(input) {
-        return None;
-    }
-    let [x, y, z] = input.position_mm;
-    let [a, b, c] = input.rotary_deg;
-    for (field, value) in [
-        ("position_mm\0", x),
-        ("position_mm\0", y),
-        ("position_mm\0", z),
-        ("rotary_deg\0", a),
-        ("rotary_deg\0", b),
-        ("rotary_deg\0", c),
-        ("load\0", input.load),
-        ("speed_rpm\0", input.speed_rpm),
-    ] {
-        // Well below what all eight together may be, so that one is named whenever they are too much.
-        if !(value.abs() < 0.3 * HUGE) {
-            return Some(Fault { code: GIB_ERR_NON_FINITE, field, value, low: -0.3 * HUGE, high: 0.3 * HUGE });
-        }
-    }
-    None
 }
