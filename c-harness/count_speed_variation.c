@@ -64,6 +64,11 @@ static int count(int waveform, const char *label)
             labelled_step(gib, &in, "seldom");
         }
     }
+    /* A live reading of the cutting torque, within what is reserved for it. */
+    for (int i = 0; i < 1000; i++) {
+        in.cutting_nm = 10.0 + (i * 7 % 11);
+        labelled_step(gib, &in, "live cutting");
+    }
     for (int i = 0; i < 1000; i++) {
         in.speed_rpm += i < 500 ? 0.5 : -0.5;
         labelled_step(gib, &in, "every cycle");

@@ -228,7 +228,8 @@ impl Plan {
             rad_s_from_rpm(speed),
             amplitude,
             in_range("period_s\0", period, PERIODS[0].max(8.0 * self.cycle_s), PERIODS[1])?,
-            in_range("cutting_nm\0", cutting, 0.0, MOST_CUTTING)?,
+            // Within what is reserved a live reading changes nothing.
+            in_range("cutting_nm\0", cutting, 0.0, MOST_CUTTING)?.max(self.cutting),
         ])
     }
 }
