@@ -34,6 +34,13 @@ pub fn may_be_found(axis: &Axis, cause: Cause) -> bool {
     cause.row().repeatable || adds || !there() || axis.effects.iter().any(|e| e.cause() == cause && in_the_balance(e))
 }
 
+/// Whether table and encoder are believed to go apart.
+#[must_use]
+pub fn parts_table(axis: &Axis) -> bool {
+    use Cause::{Backlash, DriveCompliance, ScrewPeriodicError, ScrewPitchError};
+    axis.effects.iter().any(|e| [Backlash, DriveCompliance, ScrewPeriodicError, ScrewPitchError].contains(&e.cause()))
+}
+
 /// A found effect together with what the belief has of the same cause, where they add up.
 #[must_use]
 pub fn together(axis: &Axis, found: Effect) -> Effect {

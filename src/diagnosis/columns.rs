@@ -191,6 +191,14 @@ impl Columns {
         (self.period_s / self.recorded_period_s).round().max(1.0)
     }
 
+    /// The columns without those of a table scale that repeats the encoder row by row: as little as a control without a scale
+    /// says of it that writes its encoder twice.
+    #[must_use]
+    pub fn without_repeated_scale(mut self) -> Columns {
+        self.table.take_if(|table| *table == self.position);
+        self
+    }
+
     /// The columns with so many rows averaged to one that no more than a thousand a second are left.
     #[must_use]
     pub fn thinned(self) -> Columns {

@@ -130,7 +130,10 @@ pub fn diagnose(
         Ok(masses) => masses,
         Err(why) => return Ok(insufficient(axis, vec![format!("a machine file that holds together: {why}")])),
     };
-    let columns = whole.clone().thinned();
+    let mut columns = whole.clone().thinned();
+    if !belief::parts_table(axis) {
+        columns = columns.without_repeated_scale();
+    }
     let base = belief::base_alone(axis);
     let frame = Frame::new(&base, &columns, None);
     let frame = masses.iter().fold(frame, |frame, masses| frame.after_first_swings(masses));
@@ -247,7 +250,7 @@ fn answer_on(
         notes.push(join(band, &mut findings, axis, &fit));
     }
     let shown = show::views(bench, vibration.map_or(&empty, |band| &band.before), &fit);
-    let unexplained = unexplained(bench, &fit, &shown);
+    let unexplained = unexplained(bench, &fit, &shown, whole.table.is_some());
     watch.at(1.0, "done")?;
     Ok(Diagnosis { verdict, findings, gains, unexplained, shown, missing: Vec::new(), notes, extended })
 }
@@ -280,9 +283,12 @@ fn aligned(recorded: &Recorded, frame: &Frame, late_s: f64, mut notes: Vec<Strin
     answer(recorded, &frame.aligned_by(late_s), notes)
 }
 
-/// What a fit leaves of each channel; `shown` is where that of the torque lives.
-fn unexplained(bench: &Bench, fit: &Fit, shown: &[View]) -> Unexplained {
-    let [torque, table] = bench.rest(fit);
+/// What a fit leaves of each channel; `shown` is where that of the torque lives. A scale that repeats the encoder leaves nothing.
+fn unexplained(bench: &Bench, fit: &Fit, shown: &[View], with_scale: bool) -> Unexplained {
+    let [torque, mut table] = bench.rest(fit);
+    if with_scale {
+        table.resize(torque.len(), 0.0);
+    }
     let excess = Excess::of(bench, fit, fit);
     // Of nothing there is no noise.
     let noise = |rest: &[f64], torque| if rms(rest) > 0.0 { bench.frame.floor(rest, torque) } else { 0.0 };
