@@ -6,7 +6,7 @@
 //! T(t + h) = u + (T − u)·e^(−h/τ), and a step feels its mean.
 
 use super::coupling::transmitted;
-use super::friction::Friction;
+use super::friction::{Bristle, Elements, Friction};
 use super::nearby::Nearby;
 use super::physics::Physics;
 use crate::machine::TwoMasses;
@@ -22,9 +22,18 @@ pub struct Body {
     lag: (f64, f64),
     plain: bool,
     viscous: f64,
-    /// The torques near where motor and table are.
-    nearby: [Nearby; 2],
+    /// Of motor and table.
+    held: [Held; 2],
     state: State,
+}
+
+/// What no register can hold of a mass.
+#[derive(Debug, Clone, Default)]
+struct Held {
+    /// The torques near where it is.
+    near: Nearby,
+    /// What slips in place of its bristle.
+    elements: Option<Elements>,
 }
 
 /// What changes from step to step; copied out of the body while it runs, so that it can stay in registers.
@@ -46,16 +55,17 @@ struct Mass {
     share: f64,
     position: f64,
     velocity: f64,
-    friction: Friction,
+    bristle: Bristle,
 }
 
 impl Mass {
     /// Kick by `torque` at the middle of a step, implicit in friction, then the second half of the drift.
     #[inline(always)]
-    fn kick(&mut self, h: f64, middle: f64, torque: f64, viscous: f64, level: f64) {
+    fn kick(&mut self, elements: &mut Option<Elements>, h: f64, middle: f64, torque: f64, viscous: f64, level: f64) {
         let half = 0.5 * h * self.share * viscous;
         let impulse = (self.inertia - half) * self.velocity + h * torque;
-        self.velocity = self.friction.step(self.inertia + half, impulse, h, self.velocity, self.share * level);
+        let (mass, level) = (self.inertia + half, self.share * level);
+        self.velocity = self.bristle.step(elements.as_mut(), mass, impulse, h, self.velocity, level);
         self.position = middle + 0.5 * h * self.velocity;
     }
 
@@ -70,8 +80,10 @@ impl Body {
     /// A body at a position and speed (motor's coordinate), its motor's current at `torque`.
     #[must_use]
     pub fn new(physics: Physics, step_s: f64, time_constant_s: f64, position: f64, velocity: f64, torque: f64) -> Body {
-        let mass =
-            |inertia: f64, share: f64| Mass { inertia, share, position, velocity, friction: physics.bristle(share) };
+        let mass = |inertia: f64, share: f64| {
+            let Friction { bristle, .. } = physics.bristle(share);
+            Mass { inertia, share, position, velocity, bristle }
+        };
         let (motor, table) = match &physics.two_masses {
             None => (mass(physics.inertia, 1.0), mass(physics.inertia, 0.0)),
             Some(masses) => {
@@ -93,23 +105,23 @@ impl Body {
         let plain = physics.is_plain();
         let load_per_motor = 1.0 / physics.motor_per_load;
         let viscous = physics.slope_at(1.0);
-        let nearby = [Nearby::new(&physics), Nearby::new(&physics)];
+        let held = [(); 2].map(|()| Held { near: Nearby::new(&physics), elements: physics.bristle(1.0).elements });
         let state = State { time_s: 0.0, torque, motor, table };
-        Body { physics, step_s, load_per_motor, lag, plain, viscous, nearby, state }
+        Body { physics, step_s, load_per_motor, lag, plain, viscous, held, state }
     }
 
     /// Advances by `steps` plant steps while the servo asks for `asked`.
     pub fn advance(&mut self, asked: f64, steps: usize) {
         let mut state = self.state;
-        let mut nearby = std::mem::take(&mut self.nearby);
-        let near = &mut nearby;
+        let mut held = std::mem::take(&mut self.held);
+        let own = &mut held;
         match (&self.physics.two_masses, self.plain) {
-            (None, true) => (0..steps).for_each(|_| self.rigid_step::<true>(near, &mut state, asked)),
-            (None, false) => (0..steps).for_each(|_| self.rigid_step::<false>(near, &mut state, asked)),
-            (Some(m), true) => (0..steps).for_each(|_| self.two_mass_step::<true>(m, near, &mut state, asked)),
-            (Some(m), false) => (0..steps).for_each(|_| self.two_mass_step::<false>(m, near, &mut state, asked)),
+            (None, true) => (0..steps).for_each(|_| self.rigid_step::<true>(own, &mut state, asked)),
+            (None, false) => (0..steps).for_each(|_| self.rigid_step::<false>(own, &mut state, asked)),
+            (Some(m), true) => (0..steps).for_each(|_| self.two_mass_step::<true>(m, own, &mut state, asked)),
+            (Some(m), false) => (0..steps).for_each(|_| self.two_mass_step::<false>(m, own, &mut state, asked)),
         }
-        (self.state, self.nearby) = (state, nearby);
+        (self.state, self.held) = (state, held);
     }
 
     /// Mean torque of the motor over a step.
@@ -121,17 +133,18 @@ impl Body {
     }
 
     #[inline(always)]
-    fn rigid_step<const PLAIN: bool>(&self, [near, _]: &mut [Nearby; 2], state: &mut State, asked: f64) {
+    fn rigid_step<const PLAIN: bool>(&self, [own, _]: &mut [Held; 2], state: &mut State, asked: f64) {
         let (h, p) = (self.step_s, &self.physics);
         let torque = self.motor_torque(state, asked);
         let m = &mut state.motor;
         let middle = m.middle(h);
         if PLAIN {
-            m.kick(h, middle, torque - p.constant_torque(), self.viscous, p.coulomb());
+            m.kick(&mut own.elements, h, middle, torque - p.constant_torque(), self.viscous, p.coulomb());
         } else {
             let (x, v, t) = (middle * self.load_per_motor, m.velocity * self.load_per_motor, state.time_s);
-            let torque = p.delivered(torque) - near.load(p, x, v, t) - near.cogging_torque(x);
-            m.kick(h, middle, torque, p.slope_at(m.velocity), near.friction_level(p, x, v, t));
+            let torque = p.delivered(torque) - own.near.load(p, x, v, t) - own.near.cogging_torque(x);
+            let level = own.near.friction_level(p, x, v, t);
+            m.kick(&mut own.elements, h, middle, torque, p.slope_at(m.velocity), level);
         }
         state.time_s += h;
     }
@@ -140,7 +153,7 @@ impl Body {
     fn two_mass_step<const PLAIN: bool>(
         &self,
         masses: &TwoMasses,
-        [at_motor, at_table]: &mut [Nearby; 2],
+        [at_motor, at_table]: &mut [Held; 2],
         state: &mut State,
         asked: f64,
     ) {
@@ -151,17 +164,17 @@ impl Body {
         let push = transmitted(masses, motor_middle - table_middle, motor.velocity - table.velocity);
         if PLAIN {
             let level = p.coulomb();
-            motor.kick(h, motor_middle, torque - push, self.viscous, level);
-            table.kick(h, table_middle, push - p.constant_torque(), self.viscous, level);
+            motor.kick(&mut at_motor.elements, h, motor_middle, torque - push, self.viscous, level);
+            table.kick(&mut at_table.elements, h, table_middle, push - p.constant_torque(), self.viscous, level);
         } else {
             let t = state.time_s;
             let (x, v) = (motor_middle * self.load_per_motor, motor.velocity * self.load_per_motor);
-            let torque = p.delivered(torque) - at_motor.cogging_torque(x);
-            let level = at_motor.friction_level(p, x, v, t);
-            motor.kick(h, motor_middle, torque - push, p.slope_at(motor.velocity), level);
+            let torque = p.delivered(torque) - at_motor.near.cogging_torque(x);
+            let level = at_motor.near.friction_level(p, x, v, t);
+            motor.kick(&mut at_motor.elements, h, motor_middle, torque - push, p.slope_at(motor.velocity), level);
             let (x, v) = (table_middle * self.load_per_motor, table.velocity * self.load_per_motor);
-            let (load, level) = (at_table.load(p, x, v, t), at_table.friction_level(p, x, v, t));
-            table.kick(h, table_middle, push - load, p.slope_at(table.velocity), level);
+            let (load, level) = (at_table.near.load(p, x, v, t), at_table.near.friction_level(p, x, v, t));
+            table.kick(&mut at_table.elements, h, table_middle, push - load, p.slope_at(table.velocity), level);
         }
         state.time_s += h;
     }

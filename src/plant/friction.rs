@@ -26,6 +26,15 @@ impl Default for BristleLaw {
 /// Dry friction of one body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Friction {
+    /// But for its elements.
+    pub bristle: Bristle,
+    /// In place of the bristle.
+    pub elements: Option<Elements>,
+}
+
+/// Dry friction of one body, but for elements, which no register can hold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bristle {
     /// σ: torque per displacement of the bristle; zero for pure Coulomb friction.
     pub stiffness: f64,
     /// How that falls on the way to the level.
@@ -34,8 +43,47 @@ pub struct Friction {
     pub micro_damping_s: f64,
     /// Torque of the bristle now, without its damping.
     pub force: f64,
-    /// In place of the bristle.
-    elements: Option<Elements>,
+}
+
+impl Bristle {
+    /// [`Friction::step`] with the elements that there may be in place of the bristle.
+    #[inline(always)]
+    pub fn step(
+        &mut self,
+        elements: Option<&mut Elements>,
+        mass: f64,
+        impulse: f64,
+        h: f64,
+        v: f64,
+        level: f64,
+    ) -> f64 {
+        if self.stiffness == 0.0 {
+            let left = (impulse.abs() - h * level).max(0.0);
+            // A mass is the same in most steps, and a product is ready before a quotient.
+            return left.copysign(impulse) * (1.0 / mass);
+        }
+        if level <= 0.0 {
+            self.force = 0.0;
+            return impulse / mass;
+        }
+        let next;
+        let Self { stiffness, micro_damping_s, force, .. } = *self;
+        let strained = Strained { stiffness, micro_damping_s, force };
+        if let Some(elements) = elements {
+            (self.force, next) = elements.stepped(strained, mass, impulse, h, level);
+            return next;
+        }
+        if self.curve.exponent != 1.0 {
+            (self.curve, self.force, next) = self.curve.stepped(strained, mass, impulse, h, level);
+            return next;
+        }
+        // F′ = (F + σ·h·v′)·L/d, with the bristle slipping at the speed before the step; its damping adds τ·(F′ − F)/h.
+        let (d, late) = (level + self.stiffness * h * v.abs(), h + self.micro_damping_s);
+        let impulse = impulse + self.micro_damping_s * self.force;
+        let next = (impulse * d - late * self.force * level) / (mass * d + self.stiffness * h * late * level);
+        self.force = (self.force + self.stiffness * h * next) * level / d;
+        next
+    }
 }
 
 impl Friction {
@@ -44,7 +92,7 @@ impl Friction {
     pub fn new(stiffness: f64, law: BristleLaw) -> Self {
         let BristleLaw { exponent, of_elements, micro_damping_s } = law;
         let elements = of_elements.then(|| Elements::new(exponent));
-        Self { stiffness, curve: Curve::new(exponent), micro_damping_s, force: 0.0, elements }
+        Self { bristle: Bristle { stiffness, curve: Curve::new(exponent), micro_damping_s, force: 0.0 }, elements }
     }
 
     /// A bristle at rest; with a stiffness of zero pure Coulomb friction.
@@ -58,72 +106,39 @@ impl Friction {
     /// `mass`·v′ = `impulse` − h·F with |F| up to `level`; mass and impulse hold all else that acts.
     #[inline(always)]
     pub fn step(&mut self, mass: f64, impulse: f64, h: f64, v: f64, level: f64) -> f64 {
-        if self.stiffness == 0.0 {
-            let left = (impulse.abs() - h * level).max(0.0);
-            // A mass is the same in most steps, and a product is ready before a quotient.
-            return left.copysign(impulse) * (1.0 / mass);
-        }
-        if level <= 0.0 {
-            self.force = 0.0;
-            return impulse / mass;
-        }
-        if self.elements.is_some() {
-            let next;
-            (*self, next) = self.slipped(mass, impulse, h, level);
-            return next;
-        }
-        if self.curve.exponent != 1.0 {
-            let next;
-            let Self { stiffness, micro_damping_s, force, .. } = *self;
-            let bristle = Bristle { stiffness, micro_damping_s, force };
-            (self.curve, self.force, next) = self.curve.stepped(bristle, mass, impulse, h, level);
-            return next;
-        }
-        // F′ = (F + σ·h·v′)·L/d, with the bristle slipping at the speed before the step; its damping adds τ·(F′ − F)/h.
-        let (d, late) = (level + self.stiffness * h * v.abs(), h + self.micro_damping_s);
-        let impulse = impulse + self.micro_damping_s * self.force;
-        let next = (impulse * d - late * self.force * level) / (mass * d + self.stiffness * h * late * level);
-        self.force = (self.force + self.stiffness * h * next) * level / d;
-        next
-    }
-
-    /// The same of elements: those that stick before the step are the slope. By value, so that those of pure Coulomb friction and
-    /// of bristles can stay in registers.
-    #[inline(never)]
-    fn slipped(mut self, mass: f64, impulse: f64, h: f64, level: f64) -> (Self, f64) {
-        let free = impulse - h * self.force;
-        let next = free / (mass + h * (h + self.micro_damping_s) * self.slope(free, level));
-        self.moved(h * next, level);
-        (self, next)
+        self.bristle.step(self.elements.as_mut(), mass, impulse, h, v, level)
     }
 
     /// dF/dq towards the side that `towards` says.
     fn slope(&mut self, towards: f64, level: f64) -> f64 {
+        let bristle = &mut self.bristle;
         if let Some(elements) = &self.elements {
-            return self.stiffness * elements.sticking(towards, level / self.stiffness);
+            return bristle.stiffness * elements.sticking(towards, level / bristle.stiffness);
         }
-        let left = (0.5 - 0.5 * self.force * towards.signum() / level).min(1.0);
-        if left < NOTHING { 0.0 } else { self.stiffness * 2.0 * left * self.curve.rate(left) }
+        let left = (0.5 - 0.5 * bristle.force * towards.signum() / level).min(1.0);
+        if left < NOTHING { 0.0 } else { bristle.stiffness * 2.0 * left * bristle.curve.rate(left) }
     }
 
     /// Torque after the bristle was moved by `dq`, at a given level, exactly.
     pub fn moved(&mut self, dq: f64, level: f64) -> f64 {
+        let bristle = &mut self.bristle;
         if level <= 0.0 {
-            self.force = 0.0;
+            bristle.force = 0.0;
         } else if let Some(elements) = &mut self.elements {
-            self.force = self.stiffness * elements.moved(dq, level / self.stiffness);
+            bristle.force = bristle.stiffness * elements.moved(dq, level / bristle.stiffness);
         } else {
             let end = level.copysign(dq);
-            let left = self.curve.left_after(0.5 - 0.5 * self.force / end, self.stiffness * dq.abs() / level);
-            self.force = end * (1.0 - 2.0 * left);
+            let left = bristle.curve.left_after(0.5 - 0.5 * bristle.force / end, bristle.stiffness * dq.abs() / level);
+            bristle.force = end * (1.0 - 2.0 * left);
         }
-        self.force
+        bristle.force
     }
 
     /// What its damping adds at speed `w`.
     #[must_use]
     pub fn damped(&mut self, w: f64, level: f64) -> f64 {
-        if self.micro_damping_s > 0.0 && level > 0.0 { self.micro_damping_s * w * self.slope(w, level) } else { 0.0 }
+        let micro_damping_s = self.bristle.micro_damping_s;
+        if micro_damping_s > 0.0 && level > 0.0 { micro_damping_s * w * self.slope(w, level) } else { 0.0 }
     }
 }
 
@@ -192,10 +207,10 @@ impl Curve {
     }
 
     /// The bristle's torque and the speed of a mass after a step of [`Friction::step`]: the slope is that before the step, and the
-    /// step is then taken exactly.
+    /// step is then taken exactly. By value, so that bristles can stay in registers.
     #[inline(never)]
-    fn stepped(mut self, bristle: Bristle, mass: f64, impulse: f64, h: f64, level: f64) -> (Self, f64, f64) {
-        let Bristle { stiffness, micro_damping_s, force } = bristle;
+    fn stepped(mut self, strained: Strained, mass: f64, impulse: f64, h: f64, level: f64) -> (Self, f64, f64) {
+        let Strained { stiffness, micro_damping_s, force } = strained;
         let free = impulse - h * force;
         let end = level.copysign(free);
         let left = (0.5 - 0.5 * force / end).min(1.0);
@@ -209,9 +224,9 @@ impl Curve {
     }
 }
 
-/// What a bristle is beside its curve.
+/// What a bristle or elements are beside how they yield.
 #[derive(Clone, Copy)]
-struct Bristle {
+struct Strained {
     stiffness: f64,
     micro_damping_s: f64,
     force: f64,
@@ -248,21 +263,41 @@ impl Elements {
     /// Mean strain after a displacement, with that mean of the displacements at which they break away.
     #[inline]
     pub fn moved(&mut self, by: f64, mean: f64) -> f64 {
-        let mut sum = 0.0;
         for (strained, at) in self.strained.iter_mut().zip(&self.break_away) {
             let (moved, end) = (*strained + by, at * mean);
             let below = if moved < end { moved } else { end };
             *strained = if below > -end { below } else { -end };
-            sum += *strained;
         }
-        sum / ELEMENTS as f64
+        mean_of(self.strained)
     }
 
     /// Share of the elements that do not slip when moved towards that side.
+    #[inline]
     fn sticking(&self, towards: f64, mean: f64) -> f64 {
-        let stick = |(strained, at): (&f64, &f64)| strained * towards.signum() < at * mean;
-        self.strained.iter().zip(&self.break_away).filter(|pair| stick(*pair)).count() as f64 / ELEMENTS as f64
+        let side = towards.signum();
+        let mut stick = [0.0; ELEMENTS];
+        for (stick, (strained, at)) in stick.iter_mut().zip(self.strained.iter().zip(&self.break_away)) {
+            *stick = if strained * side < at * mean { 1.0 } else { 0.0 };
+        }
+        mean_of(stick)
     }
+
+    /// Their torque and the speed of a mass after a step of [`Friction::step`]: those that stick before the step are the slope.
+    #[inline(never)]
+    fn stepped(&mut self, strained: Strained, mass: f64, impulse: f64, h: f64, level: f64) -> (f64, f64) {
+        let Strained { stiffness, micro_damping_s, force } = strained;
+        let (free, mean) = (impulse - h * force, level / stiffness);
+        let slope = stiffness * self.sticking(free, mean);
+        let next = free / (mass + h * (h + micro_damping_s) * slope);
+        (stiffness * self.moved(h * next, mean), next)
+    }
+}
+
+/// The mean, by sums that need not wait for each other.
+#[inline(always)]
+fn mean_of(of: [f64; ELEMENTS]) -> f64 {
+    let [a, b, c, d, e, f, g, h] = of;
+    (((a + e) + (c + g)) + ((b + f) + (d + h))) / ELEMENTS as f64
 }
 
 #[cfg(test)]
@@ -324,7 +359,7 @@ mod tests {
             let law = BristleLaw { exponent, of_elements: true, micro_damping_s: 0.0 };
             let mut friction = Friction::new(stiffness, law);
             friction.moved(-1.0, level);
-            assert!((friction.force + level).abs() < 1e-12);
+            assert!((friction.bristle.force + level).abs() < 1e-12);
             let (mut q, power) = (0.0, 1.0 - exponent);
             for _ in 0..100 {
                 q += 0.0007;
@@ -366,7 +401,7 @@ mod tests {
             let mut most = 0.5 * mass * v * v;
             for _ in 0..200_000 {
                 v = friction.step(mass, mass * v, h, v, 5.0);
-                let bristle = if stiffness > 0.0 { friction.force * friction.force / (2.0 * stiffness) } else { 0.0 };
+                let bristle = if stiffness > 0.0 { friction.bristle.force * friction.bristle.force / (2.0 * stiffness) } else { 0.0 };
                 let energy = 0.5 * mass * v * v + bristle;
                 assert!(energy <= most * (1.0 + 1e-9), "{energy} {most}");
                 most = energy;
