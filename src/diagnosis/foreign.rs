@@ -34,7 +34,7 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
     let beside = |law: &Foreign, place: f64| bench.beside((law.regressors)(bench.frame, place));
     let first_place = |law: &&'static Foreign| {
         let places = if law.somewhere { 1..PLACES } else { 0..1 };
-        let alike = |place: f64| (empty.squares() - beside(law, place).fit(&[]).squares()) / explained;
+        let alike = |place: f64| bench.taken_by((law.regressors)(bench.frame, place)) / explained;
         let tried = places.map(|place| place as f64 / PLACES as f64).map(|place| (alike(place), *law, place));
         tried.max_by(|a, b| a.0.total_cmp(&b.0))
     };

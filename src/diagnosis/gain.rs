@@ -4,6 +4,7 @@ use super::belief;
 use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
 use super::progress::{Stopped, Watch};
+use super::replayed;
 use crate::machine::Axis;
 use crate::plant::added::ByServo;
 use crate::plant::closed_loop::{Manner, predict_by};
@@ -30,7 +31,18 @@ pub struct Errors {
     /// friction then is not a function of the motion.
     channels: [Option<Vec<f64>>; 3],
     /// How the loop was replayed, where it was.
-    pub manner: Option<Manner>,
+    pub replay: Option<Replay>,
+}
+
+/// A machine's closed loop, as it was replayed.
+#[derive(Debug, Clone)]
+pub struct Replay {
+    /// The machine.
+    pub axis: Axis,
+    /// How.
+    pub manner: Manner,
+    /// Measured less replayed position of the first rows, as many as a diagnosis replays again.
+    pub error: Vec<f64>,
 }
 
 fn errors(axis: &Axis, observed: &Observed, servo: &ByServo) -> Option<Errors> {
@@ -43,7 +55,11 @@ fn errors(axis: &Axis, observed: &Observed, servo: &ByServo) -> Option<Errors> {
         replayed.map(|r| less(&observed.position, &r.position)),
         observed.table_position.as_ref().zip(replayed.and_then(|r| r.table_position.as_ref())).map(|(t, r)| less(t, r)),
     ];
-    Some(Errors { channels, manner: prediction.manner() })
+    let replay = prediction.manner().zip(channels[1].as_ref()).map(|(manner, error): (Manner, &Vec<f64>)| {
+        let rows = replayed::part(axis, observed).rows;
+        Replay { axis: axis.clone(), manner, error: error[..rows].to_vec() }
+    });
+    Some(Errors { channels, replay })
 }
 
 /// Errors of the torque; NaN where the axis stands.
@@ -145,7 +161,7 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
             let (even, odd) = (even.channels[channel].as_ref()?, odd.channels[channel].as_ref()?);
             Some(self.half.iter().enumerate().map(|(i, half)| [even[i], odd[i], f64::NAN][*half]).collect())
         });
-        Ok(Some(Errors { channels, manner: even.manner.clone() }))
+        Ok(Some(Errors { channels, replay: even.replay.clone() }))
     }
 
     /// RMS of the torque while the axis moves, by a machine with this set of causes.

@@ -10,13 +10,12 @@ use super::contact;
 use super::fit::{Bench, Fit};
 use super::foreign;
 use super::frame::Columns;
-use super::gain::{self, Errors, Gain, HeldOut};
+use super::gain::{self, Errors, Gain, HeldOut, Replay};
 use super::progress::{Stopped, Watch};
 use super::select::Selection;
 use super::show::{self, Coordinate};
 use super::verdict::Verdict;
 use crate::machine::{Axis, Cause, Effect};
-use crate::plant::closed_loop::Manner;
 use crate::plant::physics::LEAST_SLOPE;
 
 /// Excess over the noise floor (in variance) below which a belief holds.
@@ -63,8 +62,8 @@ pub struct Judged {
     pub selection: Selection,
     /// What they are worth on held-out blocks.
     pub gains: Vec<Gain>,
-    /// How the closed loop of what is named was replayed there, where it was.
-    pub manner: Option<Manner>,
+    /// A closed loop of what is named that was replayed there, where one was.
+    pub replay: Option<Replay>,
     /// What explains the recording and is not named all the same.
     pub refutation: Option<String>,
 }
@@ -114,8 +113,8 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let effects: Vec<Effect> = found.fit.effects(self.bench.frame).collect();
         let misleads = verdict == Verdict::PartlyExplained && moves_worse(&in_judged_rows);
         if !misleads && !refuted(&in_judged_rows, &effects) {
-            let manner = errors.and_then(|errors| errors.manner);
-            return Ok(Judged { verdict, selection: found, gains, manner, refutation: None });
+            let replay = errors.and_then(|errors| errors.replay);
+            return Ok(Judged { verdict, selection: found, gains, replay, refutation: None });
         }
         let causes = found.fit.parts.iter().map(|p| p.law.cause);
         let refutation = refutation(causes, &in_judged_rows, "rows that it was not fitted to");
@@ -141,7 +140,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             verdict: if unknown { Verdict::UnknownCause } else { Verdict::NoDiscrepancy },
             selection: Selection { fit: self.empty.clone(), rivals: Vec::new(), alike: Vec::new() },
             gains: self.held_out.gains(self.believed.as_ref(), self.believed.as_ref()),
-            manner: None,
+            replay: None,
             refutation: None,
         }
     }

@@ -20,6 +20,7 @@ use crate::analysis::statistics;
 use crate::machine::Axis;
 use crate::plant::closed_loop::Part;
 use crate::plant::linear::{decomposed, rms};
+use crate::plant::observed::Observed;
 use nalgebra::{DMatrix, DVector};
 
 /// Contiguous blocks by which the position's word is judged.
@@ -57,7 +58,8 @@ pub struct Replayed {
 pub fn refined(bench: &Bench, held_out: &HeldOut, judged: &Judged, watch: &Watch) -> Result<Option<Replayed>, Stopped> {
     let fit = &judged.selection.fit;
     let recording = held_out.recording().filter(|_| !fit.parts.is_empty());
-    let Some(((axis, (observed, servo)), manner)) = recording.zip(judged.manner.as_ref()) else { return Ok(None) };
+    let Some(((axis, (observed, servo)), known)) = recording.zip(judged.replay.as_ref()) else { return Ok(None) };
+    let manner = &known.manner;
     let position = judged.gains.iter().find(|gain| gain.channel == "position");
     if position.is_none_or(|gain| gain.after <= statistics::white_noise(&observed.position).unwrap_or(0.0)) {
         return Ok(None);
@@ -68,33 +70,34 @@ pub fn refined(bench: &Bench, held_out: &HeldOut, judged: &Judged, watch: &Watch
         rows.map(|(measured, replayed)| finite(measured - replayed)).collect()
     };
     let machine = |numbers: &Numbers| numbers.machine(axis, bench, fit);
-    let part = machine(&Numbers::of(fit)).and_then(|axis| {
-        let most = MOST_STEPS[usize::from(axis.two_masses().ok()?.is_some())];
-        Some(Part::of_steps(&axis, observed, most))
-    });
-    let Some(fine) = part else { return Ok(None) };
-    let coarse = Part { step_s: COARSER * fine.step_s, ..fine };
+    let Some(fine) = machine(&Numbers::of(fit)).map(|axis| part(&axis, observed)) else { return Ok(None) };
+    let coarse = Part { step_s: COARSER * fine.step_s, rows: fine.rows.min(known.error.len()) };
     let sure = uncertainty::of_unknowns(bench, fit);
     let stopped = stopped(fit, &sure);
     // The phases of ripples are the recording's own, and the torque's noise has turned them: they are open beside the unknowns.
     let Some(open) = Open::new(&without(&sure.covariance, &stopped), manner.ripples()) else { return Ok(None) };
-    let replay = |z: &DVector<f64>, part: Part| {
+    let replayed = |axis: &Axis, turned: &[f64]| manner.replayed(axis, (observed, servo), coarse, turned).ok()?;
+    let replay = |z: &DVector<f64>| {
         let (by, turned) = open.unknowns_and_turns(z);
-        let axis = machine(&Numbers::moved(fit, &sure, &by))?;
-        manner.replayed(&axis, (observed, servo), part, &turned).ok()?
+        replayed(&machine(&Numbers::moved(fit, &sure, &by))?, &turned)
     };
 
-    let moves: Vec<(Option<usize>, Part)> =
-        [(None, fine), (None, coarse)].into_iter().chain((0..open.count()).map(|of| (Some(of), coarse))).collect();
-    let sides = watch.each(&moves, (0.93, 0.97), STAGE, |&(of, part)| {
-        let far = |size: f64| DVector::from_fn(open.count(), |i, _| if Some(i) == of { size } else { 0.0 });
-        let side = |size: f64| Some((size, replay(&far(size), part)?));
-        let size = of.map_or(0.0, |of| open.small(of));
-        side(size).or_else(|| side(-size))
+    let moves: Vec<Move> = [Move::Known, Move::None].into_iter().chain((0..open.count()).map(Move::Of)).collect();
+    let sides = watch.each(&moves, (0.93, 0.97), STAGE, |&of| {
+        let far = |of: usize, size: f64| DVector::from_fn(open.count(), |i, _| if i == of { size } else { 0.0 });
+        let side = |of: usize, size: f64| Some((size, replay(&far(of, size))?));
+        match of {
+            Move::Known => Some((0.0, replayed(&known.axis, &[])?)),
+            Move::None => side(0, 0.0),
+            Move::Of(of) => side(of, open.small(of)).or_else(|| side(of, -open.small(of))),
+        }
     })?;
     let Some(sides) = sides.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
-    let [(_, start), (_, middle), sides @ ..] = sides.as_slice() else { return Ok(None) };
-    let mut least = error(start);
+    let [(_, known_coarse), (_, middle), sides @ ..] = sides.as_slice() else { return Ok(None) };
+    // What finer steps change is that of the machine that was replayed with them.
+    let finer = known.error.iter().zip(&observed.position).zip(known_coarse).map(|((e, x), coarse)| x - e - coarse);
+    let start: Vec<f64> = finer.zip(middle).map(|(finer, middle)| middle + finer).collect();
+    let mut least = error(&start);
     let difference = |(size, side): &(f64, Vec<f64>)| -> Vec<f64> {
         side.iter().zip(middle).map(|(side, middle)| finite((side - middle) / size)).collect()
     };
@@ -106,7 +109,7 @@ pub fn refined(bench: &Bench, held_out: &HeldOut, judged: &Judged, watch: &Watch
         if said.promised > (1.0 - WORTH[trial.min(1)]) * size(&least) {
             break;
         }
-        let Some(there) = replay(&said.place, coarse) else { break };
+        let Some(there) = replay(&said.place) else { break };
         watch.at(0.97 + 0.01 * trial as f64, STAGE)?;
         let position: Vec<f64> =
             start.iter().zip(there.iter().zip(middle)).map(|(start, (there, middle))| start + there - middle).collect();
@@ -124,6 +127,21 @@ pub fn refined(bench: &Bench, held_out: &HeldOut, judged: &Judged, watch: &Watch
         fit: bench.with_numbers(fit, &shapes, coefficients),
         sure: Sure { covariance, ..sure },
     }))
+}
+
+/// How much of a recording is replayed once more: all, or the first rows where that would take long.
+#[must_use]
+pub fn part(axis: &Axis, observed: &Observed) -> Part {
+    let most = MOST_STEPS[usize::from(matches!(axis.two_masses(), Ok(Some(_))))];
+    Part::of_steps(axis, observed, most)
+}
+
+/// What is replayed: the machine that was before, what is named, and with one of its unknowns moved.
+#[derive(Clone, Copy)]
+enum Move {
+    Known,
+    None,
+    Of(usize),
 }
 
 /// Of rows that are not known nothing is said.

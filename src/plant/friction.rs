@@ -401,7 +401,11 @@ mod tests {
             let mut most = 0.5 * mass * v * v;
             for _ in 0..200_000 {
                 v = friction.step(mass, mass * v, h, v, 5.0);
-                let bristle = if stiffness > 0.0 { friction.bristle.force * friction.bristle.force / (2.0 * stiffness) } else { 0.0 };
+                let bristle = if stiffness > 0.0 {
+                    friction.bristle.force * friction.bristle.force / (2.0 * stiffness)
+                } else {
+                    0.0
+                };
                 let energy = 0.5 * mass * v * v + bristle;
                 assert!(energy <= most * (1.0 + 1e-9), "{energy} {most}");
                 most = energy;

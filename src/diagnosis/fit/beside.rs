@@ -17,10 +17,8 @@ impl<'f, 'a> Bench<'f, 'a> {
     #[must_use]
     pub fn beside(&self, regressors: Vec<Vec<f64>>) -> Beside<'f, 'a> {
         let mut directions: Vec<Vec<f64>> = Vec::with_capacity(regressors.len());
-        for mut column in regressors {
-            let weights = self.frame.weights.iter().zip(&self.certain);
-            column.iter_mut().zip(weights).for_each(|(c, (weight, certain))| *c *= weight * certain);
-            let (direction, weights) = orthonormal(&column, &directions, &[]);
+        for column in regressors {
+            let (direction, weights) = orthonormal(&self.weighted(column), &directions, &[]);
             if weights[directions.len()] > 0.0 {
                 directions.push(direction);
             }
@@ -36,6 +34,27 @@ impl<'f, 'a> Bench<'f, 'a> {
 }
 
 impl Bench<'_, '_> {
+    /// A regressor of the torque with the weights of the rows.
+    fn weighted(&self, mut regressor: Vec<f64>) -> Vec<f64> {
+        let weights = self.frame.weights.iter().zip(&self.certain);
+        regressor.iter_mut().zip(weights).for_each(|(r, (weight, certain))| *r *= weight * certain);
+        regressor
+    }
+
+    /// What such regressors take off the squares of a fit without a cause.
+    #[must_use]
+    pub fn taken_by(&self, regressors: Vec<Vec<f64>>) -> f64 {
+        let (mut directions, mut taken) = (self.free.clone(), 0.0);
+        for column in regressors {
+            let mut column = self.weighted(column);
+            column.resize(self.measured.len(), 0.0);
+            let (direction, _) = orthonormal(&column, &directions, &[]);
+            taken += dot(&direction, &self.measured).powi(2);
+            directions.push(direction);
+        }
+        taken
+    }
+
     /// These equations with stacked columns that are free in every fit.
     #[must_use]
     pub fn beside_lines(&self, columns: &[Vec<f64>]) -> Self {
