@@ -28,8 +28,8 @@ const BLOCKS: usize = 24;
 /// Plant steps of a replay at most, of a rigid axis and of two masses, which take as long for a third of them: 40 s, and some ten
 /// seconds in which reversals at several speeds have been.
 const MOST_STEPS: [usize; 2] = [1_600_000, 500_000];
-/// What moved numbers change needs no finer plant steps than this many of the usual ones.
-const COARSER: f64 = 8.0;
+/// What moved numbers change needs no finer plant steps than this many of the usual ones, of a rigid axis and of two masses.
+const COARSER: [f64; 2] = [8.0, 2.0];
 /// Replays at most after those of the start and of the derivatives.
 const MOST_TRIALS: usize = 3;
 /// Share of the error that the first trial, and a further one, must promise to take off.
@@ -70,8 +70,9 @@ pub fn refined(bench: &Bench, held_out: &HeldOut, judged: &Judged, watch: &Watch
         rows.map(|(measured, replayed)| finite(measured - replayed)).collect()
     };
     let machine = |numbers: &Numbers| numbers.machine(axis, bench, fit);
-    let Some(fine) = machine(&Numbers::of(fit)).map(|axis| part(&axis, observed)) else { return Ok(None) };
-    let coarse = Part { step_s: COARSER * fine.step_s, rows: fine.rows.min(known.error.len()) };
+    let Some(named) = machine(&Numbers::of(fit)) else { return Ok(None) };
+    let rows = part(&named, observed).rows.min(known.error.len());
+    let coarse = Part { rows, coarser: COARSER[masses(&named) - 1] };
     let sure = uncertainty::of_unknowns(bench, fit);
     let stopped = stopped(fit, &sure);
     // The phases of ripples are the recording's own, and the torque's noise has turned them: they are open beside the unknowns.
@@ -132,8 +133,12 @@ pub fn refined(bench: &Bench, held_out: &HeldOut, judged: &Judged, watch: &Watch
 /// How much of a recording is replayed once more: all, or the first rows where that would take long.
 #[must_use]
 pub fn part(axis: &Axis, observed: &Observed) -> Part {
-    let most = MOST_STEPS[usize::from(matches!(axis.two_masses(), Ok(Some(_))))];
-    Part::of_steps(axis, observed, most)
+    Part::of_steps(axis, observed, MOST_STEPS[masses(axis) - 1])
+}
+
+/// How many masses an axis is.
+fn masses(axis: &Axis) -> usize {
+    if matches!(axis.two_masses(), Ok(Some(_))) { 2 } else { 1 }
 }
 
 /// What is replayed: the machine that was before, what is named, and with one of its unknowns moved.

@@ -159,15 +159,15 @@ impl Manner {
 pub struct Part {
     /// The first so many rows.
     pub rows: usize,
-    /// Longest plant step, s.
-    pub step_s: f64,
+    /// How many times longer the plant steps are than usual.
+    pub coarser: f64,
 }
 
 impl Part {
     /// All of a recording as usual.
     #[must_use]
     pub fn whole(observed: &Observed) -> Self {
-        Self { rows: observed.time_s.len(), step_s: Setup::default().step_s }
+        Self { rows: observed.time_s.len(), coarser: 1.0 }
     }
 
     /// As many rows as a number of plant steps suffices for.
@@ -175,7 +175,7 @@ impl Part {
     pub fn of_steps(axis: &Axis, observed: &Observed, most: usize) -> Self {
         let whole = Self::whole(observed);
         let step_s = Physics::of(axis).ok().zip(axis.servo).and_then(|(physics, servo)| {
-            Some(servo.period_s / steps_per_cycle(&physics, &servo, whole.step_s).ok()? as f64)
+            Some(servo.period_s / steps_per_cycle(&physics, &servo, &Setup::default()).ok()? as f64)
         });
         let rows = step_s.map_or(0.0, |step_s| most as f64 * step_s / observed.period_s);
         Self { rows: whole.rows.min(rows as usize), ..whole }
@@ -265,7 +265,7 @@ fn replay(
     let position = measured.or(command.peek().copied()).unwrap_or(0.0);
     let torque = finite(prediction.at_start).unwrap_or(0.0);
     let start = Start { position, velocity, torque };
-    let setup = Setup { step_s: part.step_s, start: Some(start), command_speed, ..Setup::default() };
+    let setup = Setup { coarser: part.coarser, start: Some(start), command_speed, ..Setup::default() };
     // The rows of a recording made once a servo cycle are the cycles themselves.
     let place = |row: usize| {
         let exact = (time[row] - begin) / servo.period_s;

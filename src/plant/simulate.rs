@@ -48,6 +48,8 @@ pub struct Start {
 pub struct Setup {
     /// Longest plant step, s; a servo cycle is divided into whole steps, and a stiff drive makes them finer.
     pub step_s: f64,
+    /// How many times longer the steps are than either asks for.
+    pub coarser: f64,
     /// Sensors.
     pub sensors: Sensors,
     /// Of the noise and of the phases of periodic effects.
@@ -62,6 +64,7 @@ impl Default for Setup {
     fn default() -> Setup {
         Setup {
             step_s: 25e-6,
+            coarser: 1.0,
             sensors: Sensors::default(),
             seed: 0,
             start: None,
@@ -145,7 +148,7 @@ pub fn simulate_cycles(
         axis.servo.ok_or("the machine file gives this axis no servo, so that no closed loop can be simulated")?;
     let mut command = command.peekable();
     let Some(&first) = command.peek() else { return Ok(()) };
-    let steps = steps_per_cycle(&physics, &servo, setup.step_s)?;
+    let steps = steps_per_cycle(&physics, &servo, setup)?;
     let step_s = servo.period_s / steps as f64;
     let start = setup.start.unwrap_or(Start { position: first, velocity: 0.0, torque: physics.load(first, 0.0, 0.0) });
     let scale = physics.motor_per_load;
@@ -186,14 +189,15 @@ pub fn simulate_cycles(
 ///
 /// # Errors
 /// The step is out of range, or the drive so stiff that there would be over a million.
-pub(super) fn steps_per_cycle(physics: &Physics, servo: &Servo, step_s: f64) -> Result<usize, String> {
+pub(super) fn steps_per_cycle(physics: &Physics, servo: &Servo, setup: &Setup) -> Result<usize, String> {
+    let Setup { step_s, coarser, .. } = *setup;
     if !(step_s >= 1e-8 && step_s <= 1.0) {
         return Err(format!("the plant step of {step_s} s is out of range; give one from 1e-8 s to 1 s"));
     }
     let spring = physics
         .two_masses
         .map_or(f64::INFINITY, |masses| longest_step_s(&masses, masses.motor_inertia.min(masses.table_inertia)));
-    let steps = (servo.period_s / step_s.min(spring) - 1e-9).ceil().max(1.0);
+    let steps = (servo.period_s / (coarser * step_s.min(spring)) - 1e-9).ceil().max(1.0);
     if steps > 1e6 {
         return Err("the drive is so stiff against its inertia that a cycle would take over a million steps".into());
     }
