@@ -11,7 +11,7 @@ mod swings;
 
 use super::filter::{LowPass, convolve, norm, of_three};
 use super::grids;
-use super::many::{decay, product, to_the_power, widest};
+use super::many::{decay, to_the_power, weighted_sums, widest};
 use super::rows::{beside_filled, direction_of, doubtful_rows, judged_rows, resting_rows};
 use super::sampling::{NUMEROV, Sampling};
 use crate::machine::{Axis, Belief, Effect};
@@ -261,17 +261,7 @@ impl<'a> Frame<'a> {
     /// Weighted sum of the rows about each judged row, `offset` rows later. The rows that are not judged are not worked out.
     fn weighed(&self, values: &[f64], kernel: &[f64], offset: isize) -> Vec<f64> {
         let first = offset - (kernel.len() / 2) as isize;
-        let mut sums = vec![0.0; self.kept.len()];
-        widest(
-            #[inline(always)]
-            || {
-                for (sum, row) in sums.iter_mut().zip(&self.kept) {
-                    let begin = row.saturating_add_signed(first);
-                    *sum = values.get(begin..begin + kernel.len()).map_or(0.0, |window| product(window, kernel));
-                }
-            },
-        );
-        sums
+        weighted_sums(values, kernel, self.kept.iter().map(|row| row.saturating_add_signed(first)))
     }
 
     /// table − encoder at the judged rows, about its mean, since each sensor has a zero of its own; empty without a table scale.

@@ -93,15 +93,20 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             return Ok(Judged { refutation: Some(imitation(&found.fit, goes)), ..self.nothing(&found) });
         }
         found = contact::settled(self.bench, &self.held_out, found, self.watch)?;
-        let mut errors = self.held_out.errors(&found.fit)?;
-        if let Some(less) = self.without_spring(&found.fit) {
-            let without = if less.parts.is_empty() { self.believed.clone() } else { self.held_out.errors(&less)? };
+        let mut less = self.without_spring(&found.fit);
+        // Below the noise floor there is nothing but what the encoder makes, which drives the simulation too.
+        if let Some(less) = less.take_if(|less| Excess::of(self.bench, less, &found.fit).largest() <= 0.0) {
+            (found.fit, found.alike) = (less, Vec::new());
+            let Some(still) = self.explains(&found.fit) else { return Ok(self.nothing(&found)) };
+            verdict = still;
+        }
+        let mut errors = self.errors(&found.fit)?;
+        if let Some(less) = less {
+            let without = self.errors(&less)?;
             let mut gains = self.held_out.gains(without.as_ref(), errors.as_ref());
             gains.retain(|gain| gain.channel != "table_position");
             gains.extend(gain::of_stretch(without.as_ref(), errors.as_ref()));
-            // Below the noise floor there is nothing but what the encoder makes, which drives the simulation too.
-            let left = Excess::of(self.bench, &less, &found.fit).largest();
-            if left <= 0.0 || is_idle(&gains) {
+            if is_idle(&gains) {
                 (found.fit, found.alike, errors) = (less, Vec::new(), without);
                 let Some(still) = self.explains(&found.fit) else { return Ok(self.nothing(&found)) };
                 verdict = still;
@@ -119,6 +124,11 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let causes = found.fit.parts.iter().map(|p| p.law.cause);
         let refutation = refutation(causes, &in_judged_rows, "rows that it was not fitted to");
         Ok(Judged { refutation: Some(refutation), ..self.nothing(&found) })
+    }
+
+    /// Errors of a set on held-out blocks.
+    fn errors(&self, fit: &Fit) -> Result<Option<Errors>, Stopped> {
+        if fit.parts.is_empty() { Ok(self.believed.clone()) } else { self.held_out.errors(fit) }
     }
 
     /// A set without what is simulated behind the measured motion (a spring, a clearance), where that may gain by taking off what

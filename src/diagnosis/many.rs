@@ -41,6 +41,52 @@ pub fn add(to: &mut [f64], factor: f64, column: &[f64]) {
     );
 }
 
+/// Sums of the values from each place on by the weights of a kernel; 0 where they end before it does.
+#[must_use]
+pub fn weighted_sums(values: &[f64], kernel: &[f64], places: impl ExactSizeIterator<Item = usize>) -> Vec<f64> {
+    let mut sums = vec![0.0; places.len()];
+    let of_each = sums.iter_mut().zip(places);
+    widest(
+        #[inline(always)]
+        || match kernel.len() {
+            ..=8 => of_length::<8>(values, kernel, of_each),
+            ..=12 => of_length::<12>(values, kernel, of_each),
+            ..=16 => of_length::<16>(values, kernel, of_each),
+            ..=24 => of_length::<24>(values, kernel, of_each),
+            _ => of_each.for_each(|(sum, from)| *sum = weighted_sum(values, kernel, from)),
+        },
+    );
+    sums
+}
+
+#[inline(always)]
+fn weighted_sum(values: &[f64], kernel: &[f64], from: usize) -> f64 {
+    values.get(from..from + kernel.len()).map_or(0.0, |window| product(window, kernel))
+}
+
+/// By a kernel that zeros make so long: a length that is known beforehand takes no loop.
+#[inline(always)]
+fn of_length<'s, const K: usize>(
+    values: &[f64],
+    kernel: &[f64],
+    sums_and_places: impl Iterator<Item = (&'s mut f64, usize)>,
+) {
+    let mut weights = [0.0; K];
+    weights[..kernel.len()].copy_from_slice(kernel);
+    for (sum, from) in sums_and_places {
+        *sum = match values.get(from..).and_then(<[f64]>::first_chunk::<K>) {
+            Some(window) => {
+                let mut four = [0.0; 4];
+                for k in 0..K {
+                    four[k % 4] += weights[k] * window[k];
+                }
+                (four[0] + four[2]) + (four[1] + four[3])
+            }
+            None => weighted_sum(values, kernel, from),
+        };
+    }
+}
+
 /// [`sine_cosine`] of each.
 pub fn sines_and_cosines(turns: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let (mut sines, mut cosines) = (vec![0.0; turns.len()], vec![0.0; turns.len()]);
@@ -155,6 +201,18 @@ mod tests {
         let mut ends = [0.0, 1e-310, 1.0, 1e200, f64::INFINITY];
         to_the_power(&mut ends, 5.0);
         assert!(ends[0] < 1e-299 && ends[1] < 1e-299 && ends[2] == 1.0 && ends[3] > 1e300 && ends[4] > 1e300);
+    }
+
+    #[test]
+    fn sums_by_kernels_of_any_length_reach_the_last_value() {
+        let values: Vec<f64> = (0..60).map(|i| f64::from(i * i % 17)).collect();
+        for length in 1..30 {
+            let kernel: Vec<f64> = (0..length).map(|k| f64::from(k as u32 % 5)).collect();
+            let sums = weighted_sums(&values, &kernel, 0..60);
+            let sum = |from: usize| values[from..].iter().zip(&kernel).map(|(value, weight)| value * weight).sum();
+            let whole = |from: usize| if from + length > values.len() { 0.0 } else { sum(from) };
+            assert!(sums.iter().enumerate().all(|(from, sum)| *sum == whole(from)), "{length}");
+        }
     }
 
     #[test]

@@ -153,9 +153,12 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
         if last_gain < 0.5 * LEAST_GAIN {
             break;
         }
+        let of_fewer = best.last().map_or(f64::INFINITY, price);
         best.push(first.clone());
         rivals = grown.iter().skip(1).take(4).cloned().collect();
         grown.truncate(BEAM);
+        // What a set of fewer causes does as well has gone astray.
+        grown.retain(|fit| price(fit) < of_fewer);
         beam = grown;
     }
     let start = best.pop().unwrap_or_else(|| search.bench.fit(Vec::new()));

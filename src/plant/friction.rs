@@ -261,7 +261,7 @@ impl Elements {
     }
 
     /// Mean strain after a displacement, with that mean of the displacements at which they break away.
-    #[inline]
+    #[inline(always)]
     pub fn moved(&mut self, by: f64, mean: f64) -> f64 {
         for (strained, at) in self.strained.iter_mut().zip(&self.break_away) {
             let (moved, end) = (*strained + by, at * mean);

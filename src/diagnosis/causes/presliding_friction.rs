@@ -3,6 +3,7 @@
 //! own damping adds τ·ż (LuGre, Canudas de Wit et al. 1995). Driven by the measured position, so no speed has to be known.
 
 use super::*;
+use crate::diagnosis::many::{decay, widest};
 use crate::plant::friction::{Curve, Elements};
 
 /// The law while causes are sought. Traces: z − sign(v), whose coefficient is the friction level that builds up, and ż, whose
@@ -31,8 +32,8 @@ const fn with_exponent(scales: &'static [Scale]) -> Law {
         manner: PLAIN,
         terms: |frame, shapes| {
             each(shapes, |shape| {
-                let [state, rate] = build_up(frame, shape[0] * 1e-3, shape[1], is_of_elements(shape[2]));
-                let less: Vec<f64> = state.iter().zip(&frame.direction).map(|(z, s)| z - s).collect();
+                let [mut less, rate] = build_up(frame, shape[0] * 1e-3, shape[1], is_of_elements(shape[2]));
+                less.iter_mut().zip(&frame.direction).for_each(|(z, direction)| *z -= direction);
                 let regressors = [less, rate].map(|values| Trace::torque(frame.judged(&values))).into();
                 Term { fixed: None, regressors }
             })
@@ -65,21 +66,48 @@ fn is_of_elements(kind: f64) -> bool {
 fn build_up(frame: &Frame, displacement: f64, exponent: f64, of_elements: bool) -> [Vec<f64>; 2] {
     let x = &frame.columns.position;
     let (mut state, mut rate) = (vec![0.0; x.len()], vec![0.0; x.len()]);
+    let per_displacement = displacement.recip();
     let mut curve = Curve::new(exponent);
     let at_rest = of_elements.then(|| Elements::new(exponent));
     for s in &frame.columns.stretches {
-        let (mut z, mut elements) = (0.0, at_rest);
-        for i in s.start + 1..s.end {
-            let step = (x[i] - x[i - 1]) / displacement;
-            if let Some(elements) = &mut elements {
-                // Where all of them slip they go on slipping.
-                let slip = z * step.signum() >= 1.0;
-                z = if slip { z } else { elements.moved(step, 1.0) };
-            } else if step != 0.0 {
-                let end = step.signum();
-                z = end * (1.0 - 2.0 * curve.left_after(0.5 - 0.5 * z * end, step.abs()));
+        let (rows, passed) = (&x[s.clone()], &mut state[s.clone()]);
+        let steps = rows.windows(2).map(|pair| (pair[1] - pair[0]) * per_displacement);
+        let states = passed.iter_mut().skip(1).zip(steps);
+        match at_rest {
+            Some(elements) => widest(
+                #[inline(always)]
+                || {
+                    let (mut z, mut elements) = (0.0, elements);
+                    for (state, step) in states {
+                        // Where all of them slip they go on slipping.
+                        z = if z * step.signum() >= 1.0 { z } else { elements.moved(step, 1.0) };
+                        *state = z;
+                    }
+                },
+            ),
+            None if exponent == 1.0 => {
+                // What is left of the way after a step waits for no other step.
+                widest(
+                    #[inline(always)]
+                    || states.for_each(|(state, step)| *state = decay(step.abs())),
+                );
+                let mut z = 0.0;
+                for (state, pair) in passed.iter_mut().skip(1).zip(rows.windows(2)) {
+                    let end = if pair[1] > pair[0] { 1.0 } else { -1.0 };
+                    z = end + (z - end) * *state;
+                    *state = z;
+                }
             }
-            state[i] = z;
+            None => {
+                let mut z = 0.0;
+                for (state, step) in states {
+                    if step != 0.0 {
+                        let end = step.signum();
+                        z = end * (1.0 - 2.0 * curve.left_after(0.5 - 0.5 * z * end, step.abs()));
+                    }
+                    *state = z;
+                }
+            }
         }
         for i in s.start + 1..s.end.saturating_sub(1) {
             rate[i] = (state[i + 1] - state[i - 1]) * (0.5 / frame.columns.period_s);

@@ -178,10 +178,9 @@ impl<'a, const N: usize> Tables<'a, N> {
         ROOM.with_borrow_mut(|[extra, lag]| {
             let rows = self.frame.x.len();
             let lags = if self.frame.columns.table.is_some() { rows } else { 0 };
-            for (column, rows) in [(&mut *extra, rows), (&mut *lag, lags)] {
-                column.clear();
-                column.resize(N * rows, 0.0);
-            }
+            // What was there before is written over, row by row.
+            extra.resize(N * rows, 0.0);
+            lag.resize(N * lags, 0.0);
             let [extra, lag] = [extra, lag].map(|column| column.as_chunks_mut::<N>().0);
             let sliding = if self.flanks { None } else { Some(self.sliding()) };
             for s in &self.frame.columns.stretches {

@@ -42,7 +42,10 @@ impl<const N: usize> Tables<'_, N> {
             loose: [false; N],
         };
         let mut any = false;
+        extra[rows.start] = [0.0; N];
+        lag.get_mut(rows.clone()).into_iter().flatten().last().into_iter().for_each(|last| *last = [0.0; N]);
         for i in rows.start..rows.end - 1 {
+            extra[i + 1] = [0.0; N];
             let next = self.carried(i + 1);
             let motor = self.frame.columns.position[i] * unit;
             let steady = i > rows.start && self.frame.direction[i] * self.frame.direction[i + 1] > 0.5;

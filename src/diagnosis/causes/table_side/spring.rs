@@ -107,6 +107,8 @@ impl<const N: usize> Tables<'_, N> {
             x[l] = -x[l] / self.stiffness[l];
         }
         let mut v = [self.frame.raw_speed[rows.start] * unit; N];
+        extra[rows.start] = [0.0; N];
+        lag.get_mut(rows.clone()).into_iter().flatten().last().into_iter().for_each(|last| *last = [0.0; N]);
         for i in rows.start..rows.end - 1 {
             if let Some(lag) = lag.get_mut(i) {
                 // The real spring winds up less.
@@ -136,7 +138,7 @@ impl<const N: usize> Tables<'_, N> {
             let rigid = self.rigid(i);
             for l in 0..N {
                 extra[i][l] += (sum[l] - far[l]) * per_step - rigid[0][l];
-                extra[i + 1][l] += far[l] * per_step - rigid[1][l];
+                extra[i + 1][l] = far[l] * per_step - rigid[1][l];
             }
         }
     }
