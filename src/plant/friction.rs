@@ -343,11 +343,11 @@ mod tests {
             v = next;
             if step % 1000 == 999 {
                 let law = level * (1.0 - (-stiffness * q / level).exp());
-                assert!((dynamic.force - law).abs() < 2e-3 * level, "{} {law}", dynamic.force);
+                assert!((dynamic.bristle.force - law).abs() < 2e-3 * level, "{} {law}", dynamic.bristle.force);
             }
         }
         exact.moved(q, level);
-        assert!((dynamic.force - exact.force).abs() < 2e-3 * level);
+        assert!((dynamic.bristle.force - exact.bristle.force).abs() < 2e-3 * level);
     }
 
     /// Elements from a reversal on follow the curve of their exponent (Masing's rule), and a small way back and forth leaves them
@@ -386,9 +386,9 @@ mod tests {
                 }
                 v = dragged.step(mass, mass * v, h, v, level);
                 exact.moved(h * v, level);
-                assert!((dragged.force - exact.force).abs() < 1e-6 * level, "{exponent}");
+                assert!((dragged.bristle.force - exact.bristle.force).abs() < 1e-6 * level, "{exponent}");
             }
-            assert!((dragged.force / -level - 1.0).abs() < 0.02, "{}", dragged.force);
+            assert!((dragged.bristle.force / -level - 1.0).abs() < 0.02, "{}", dragged.bristle.force);
         }
     }
 
