@@ -49,10 +49,10 @@ pub fn weighted_sums(values: &[f64], kernel: &[f64], places: impl ExactSizeItera
     widest(
         #[inline(always)]
         || match kernel.len() {
-            ..=8 => of_length::<8>(values, kernel, of_each),
-            ..=12 => of_length::<12>(values, kernel, of_each),
-            ..=16 => of_length::<16>(values, kernel, of_each),
-            ..=24 => of_length::<24>(values, kernel, of_each),
+            0..=8 => of_length::<8>(values, kernel, of_each),
+            9..=12 => of_length::<12>(values, kernel, of_each),
+            13..=16 => of_length::<16>(values, kernel, of_each),
+            17..=24 => of_length::<24>(values, kernel, of_each),
             _ => of_each.for_each(|(sum, from)| *sum = weighted_sum(values, kernel, from)),
         },
     );
