@@ -1278,7 +1278,7 @@
 #define GIB_VIBRATION_STOPPING 4
 
 /**
- * Ended with an error; the position is the plain scale until the next start.
+ * Ended with an error; the position is the plain scale until the next start, once the correction has faded.
  */
 #define GIB_VIBRATION_FAILED 5
 
@@ -3101,7 +3101,7 @@ typedef struct gib_vibration_input {
      */
     double scale_mm;
     /**
-     * Encoder of the second slide (XM), mm; only looked at with `second_slide`.
+     * Encoder of the second slide (XM), mm; only looked at with `second_slide`. Beyond 1e9 mm it counts as no number.
      */
     double second_slide_mm;
     /**
@@ -6339,7 +6339,8 @@ void gib_vibration_free(struct gib_vibration *handle);
 /**
  * Checks the configuration and begins to correct the position, with the next step.
  *
- * The correction comes in by itself once the spindle has turned a whole revolution with good sensors.
+ * The correction comes in by itself once the spindle has turned a whole revolution with good sensors, at a speed that changed by
+ * less than a quarter meanwhile.
  *
  * @param handle the instance.
  * @param config how to correct; copied. Set `struct_size`, zero the rest, then set what you want.
@@ -6366,7 +6367,7 @@ int32_t gib_vibration_start(struct gib_vibration *handle,
  * @param input measured values of this cycle, all of the same instant.
  * @param output the position; always written when not NULL.
  * @return GIB_OK when idle, GIB_BUSY, or the first error, which is kept until the next start: GIB_ERR_ABORTED,
- * GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE when the scale is no number (the last position is repeated in such a cycle);
+ * GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE when the scale is no number (the last position is repeated in such a cycle, and the correction fades);
  * and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
  *
  * [thread: cycle] [real-time: yes] [state: any]

@@ -332,8 +332,14 @@ fn it_fades_out_when_aborted_and_fails_on_a_scale_that_is_no_number() {
     let before = rig.output.position_mm;
     rig.cycle(|input| input.scale_mm = f64::NAN);
     assert!(rig.output.status == GIB_ERR_NON_FINITE && rig.output.position_mm == before);
-    rig.cycle(|_| ());
-    assert!(rig.output.status == GIB_ERR_NON_FINITE && rig.output.position_mm == 7.0);
+    // The correction goes from the position as after any fault, in the fade's 200 cycles, of which that was one.
+    let mut last = before;
+    for i in 1..=199 {
+        rig.cycle(|_| ());
+        assert!(rig.output.status == GIB_ERR_NON_FINITE && rig.output.phase == GIB_VIBRATION_FAILED);
+        assert!((rig.output.position_mm - last).abs() < 1e-4 && (i == 199) == (rig.output.position_mm == 7.0), "{i}");
+        last = rig.output.position_mm;
+    }
     assert_eq!(rig.gib.fault().field, "scale_mm\0");
 }
 

@@ -86,7 +86,8 @@ pub unsafe extern "C" fn gib_vibration_free(handle: *mut GibVibration) {
 
 /// Checks the configuration and begins to correct the position, with the next step.
 ///
-/// The correction comes in by itself once the spindle has turned a whole revolution with good sensors.
+/// The correction comes in by itself once the spindle has turned a whole revolution with good sensors, at a speed that changed by
+/// less than a quarter meanwhile.
 ///
 /// @param handle the instance.
 /// @param config how to correct; copied. Set `struct_size`, zero the rest, then set what you want.
@@ -126,7 +127,7 @@ pub unsafe extern "C" fn gib_vibration_start(
 /// @param input measured values of this cycle, all of the same instant.
 /// @param output the position; always written when not NULL.
 /// @return GIB_OK when idle, GIB_BUSY, or the first error, which is kept until the next start: GIB_ERR_ABORTED,
-/// GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE when the scale is no number (the last position is repeated in such a cycle);
+/// GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE when the scale is no number (the last position is repeated in such a cycle, and the correction fades);
 /// and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
 ///
 /// [thread: cycle] [real-time: yes] [state: any]

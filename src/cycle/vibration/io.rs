@@ -17,7 +17,7 @@ pub const GIB_VIBRATION_CORRECTING: i32 = 2;
 pub const GIB_VIBRATION_DEGRADED: i32 = 3;
 /// Aborted: the correction fades out.
 pub const GIB_VIBRATION_STOPPING: i32 = 4;
-/// Ended with an error; the position is the plain scale until the next start.
+/// Ended with an error; the position is the plain scale until the next start, once the correction has faded.
 pub const GIB_VIBRATION_FAILED: i32 = 5;
 
 /// Reason: no whole revolution since the start or since the last fault.
@@ -41,7 +41,7 @@ pub const GIB_VIBRATION_IMPLAUSIBLE: u32 = 0x0008_0000;
 pub struct VibrationInput {
     /// X linear scale: tool slide against its seat, mm.
     pub scale_mm: f64,
-    /// Encoder of the second slide (XM), mm; only looked at with `second_slide`.
+    /// Encoder of the second slide (XM), mm; only looked at with `second_slide`. Beyond 1e9 mm it counts as no number.
     pub second_slide_mm: f64,
     /// Spindle angle, degrees; wrapped anywhere or not at all.
     pub angle_deg: f64,

@@ -12,7 +12,7 @@ mod follow;
 mod quick;
 mod renew;
 
-use super::harmonic::{Harmonics, PAIRS, Trackers};
+use super::harmonic::{Harmonics, PAIRS, Trackers, grow};
 use super::integrate::Integrator;
 use super::io::*;
 use super::known::Known;
@@ -40,6 +40,8 @@ enum Phase {
 const FEW: usize = PAIRS / 2;
 /// Reasons that a sensor or the angle gives: the harmonics must be learnt anew.
 const BAD: u32 = !(GIB_VIBRATION_NO_REVOLUTION | GIB_VIBRATION_NO_ROTATION);
+/// A second slide that is nowhere, mm: a number that is no position.
+const NOWHERE: f64 = 1e9;
 /// Turns of readings far off the harmonics after which they are no longer believed.
 const SURPRISE: f32 = 0.5;
 
@@ -56,6 +58,9 @@ pub struct Vibration {
     blend: f64,
     /// Position put out last.
     position: f64,
+    /// What is left of a correction that ended at once, µm, and by how much it shrinks in a cycle.
+    leaving: f64,
+    leaves: f64,
     /// Pairs of harmonics of the cycles that are all alike, see [`quick`]; 0 while they are not.
     usual: usize,
     renewal: Renewal,
@@ -92,6 +97,8 @@ impl Default for Vibration {
             revolution: 1.0,
             blend: 0.0,
             position: 0.0,
+            leaving: 0.0,
+            leaves: 0.0,
             usual: 0,
             renewal: Renewal::default(),
             part: 0.0,
@@ -120,7 +127,8 @@ impl Vibration {
         if self.busy() {
             return Err(Fault::of(GIB_ERR_STATE));
         }
-        *self = Vibration { plan: plan?, phase: Phase::Running, position: self.position, ..Vibration::default() };
+        let (plan, position, leaving, leaves) = (plan?, self.position, self.leaving, self.leaves);
+        *self = Vibration { plan, phase: Phase::Running, position, leaving, leaves, ..Vibration::default() };
         self.trackers = Trackers::bounding(self.plan.displacement_max as f32);
         Ok(())
     }
@@ -174,7 +182,8 @@ impl Vibration {
     fn any(&mut self, input: &VibrationInput, output: &mut VibrationOutput) {
         self.usual = 0;
         let plain = if self.plan.second_slide { input.scale_mm + input.second_slide_mm } else { input.scale_mm };
-        if !plain.is_finite() {
+        let encoder = if self.plan.second_slide { input.second_slide_mm } else { 0.0 };
+        if !(plain.is_finite() && encoder.abs() < NOWHERE) {
             return self.blind(input, output);
         }
         if !self.busy() {
@@ -205,11 +214,17 @@ impl Vibration {
         if reasons != 0 {
             self.progress = 0.0;
             self.revolution = 1.0;
-            if self.blend == 0.0 {
-                self.spindle.forget_jumps();
-            }
-        } else {
+        }
+        if self.progress == 0.0 && self.blend == 0.0 {
+            self.spindle.forget_jumps();
+        }
+        // What was known goes first, and then is learnt anew: were it learnt meanwhile, the correction would jump from one to the other.
+        if reasons == 0 && (self.progress > 0.0 || self.blend == 0.0) {
             self.progress += turned.abs();
+        }
+        // A first revolution of a spindle that runs up tells of no speed, and would grow with the speed from there.
+        if self.progress >= 1.0 && self.revolution == 1.0 && !self.plan.integrate && self.spindle.far() {
+            self.progress = 0.0;
         }
         if self.progress < 1.0 { reasons | GIB_VIBRATION_NO_REVOLUTION } else { reasons }
     }
@@ -230,7 +245,7 @@ impl Vibration {
             self.renew_pair();
         } else {
             // What does not learn does not follow the speed either: what fades out is what was known.
-            if self.phase == Phase::Running && reasons == GIB_VIBRATION_NO_REVOLUTION {
+            if self.phase == Phase::Running && reasons == GIB_VIBRATION_NO_REVOLUTION && self.progress > 0.0 {
                 self.learn_first::<N>(input, &wheel);
             }
         }
@@ -247,10 +262,13 @@ impl Vibration {
 
     /// The first revolution, from which the harmonics start.
     fn learn_first<const N: usize>(&mut self, input: &VibrationInput, wheel: &Wheel) {
-        let (asked, part) = (self.plan.harmonics, self.spindle.turned.abs());
+        let (asked, part) = (self.spindle.followed(&self.plan), self.spindle.turned.abs());
         let begins = self.progress <= part;
         if begins {
-            self.settle();
+            // What was known before has gone from the position, and is worth nothing; so are factors for what once stood.
+            grow(&mut self.displacement, self.plan.pairs, self.growth);
+            (self.known, self.renewal, self.growth) = (Default::default(), Renewal::default(), 1.0);
+            self.spindle.settle(&self.plan);
         }
         for (trackers, readings) in self.signals(input) {
             if begins {
@@ -264,8 +282,9 @@ impl Vibration {
     #[cold]
     fn end_first<const N: usize>(&mut self, input: &VibrationInput, wheel: &Wheel) {
         self.revolution = f64::INFINITY;
-        self.part = 1.0;
-        self.renewal.rate = self.spindle.rate;
+        self.displacement = Default::default();
+        (self.growth, self.swing, self.part) = (1.0, 0.0, 1.0);
+        self.renewal.rate = self.spindle.speed();
         self.spindle.settle(&self.plan);
         let part = 1.0 - (self.progress - self.spindle.turned.abs());
         for (trackers, readings) in self.signals(input) {
@@ -304,7 +323,8 @@ impl Vibration {
 
     /// Displacements by integration, µm.
     fn integrated(&mut self, input: &VibrationInput, reasons: u32) -> [f64; 2] {
-        if reasons & !GIB_VIBRATION_NO_REVOLUTION != 0 {
+        // Also while what was known goes.
+        if reasons & !GIB_VIBRATION_NO_REVOLUTION != 0 || self.progress == 0.0 {
             self.integrators.iter_mut().for_each(Integrator::restart);
             return self.held;
         }
@@ -344,6 +364,8 @@ impl Vibration {
         }
         self.progress = 0.0;
         self.revolution = 1.0;
+        // What was integrated ends in the middle of a revolution: closed as a whole one it would give offsets as wrong again.
+        self.integrators.iter_mut().for_each(Integrator::restart);
         let reason = |bad| if bad { GIB_VIBRATION_IMPLAUSIBLE } else { 0 };
         reason(seat) | reason(bearing) << 8 | GIB_VIBRATION_NO_REVOLUTION
     }
@@ -359,16 +381,9 @@ impl Vibration {
         } else {
             0.0
         };
-        let most = 2.0 * self.plan.displacement_max;
-        let relative = displacement[0] - displacement[1];
-        let relative = if relative > most {
-            most
-        } else if relative < -most {
-            -most
-        } else {
-            relative
-        };
-        let correction = self.blend * relative;
+        let relative = self.relative(displacement);
+        let left = if self.leaving == 0.0 { 0.0 } else { self.part() };
+        let correction = self.blend * relative + left;
         self.position = plain + 1e-3 * correction;
         self.seen |= reasons;
         *output = VibrationOutput {
@@ -388,6 +403,26 @@ impl Vibration {
         }
     }
 
+    /// Seat minus bearing, no further than both may be.
+    fn relative(&self, [seat, bearing]: [f64; 2]) -> f64 {
+        let (relative, most) = (seat - bearing, 2.0 * self.plan.displacement_max);
+        if relative > most {
+            most
+        } else if relative < -most {
+            -most
+        } else {
+            relative
+        }
+    }
+
+    /// What is left in this cycle of a correction that ended at once.
+    #[cold]
+    fn part(&mut self) -> f64 {
+        let left = self.leaving.abs() - self.leaves;
+        self.leaving = if left > 0.0 { left.copysign(self.leaving) } else { 0.0 };
+        self.leaving
+    }
+
     /// Says why there is no correction.
     fn explain(&mut self, output: &mut VibrationOutput) {
         let bad = output.reasons & BAD;
@@ -405,12 +440,14 @@ impl Vibration {
         }
     }
 
-    /// Idle or Failed: the plain scale.
+    /// Idle or Failed: the plain scale, once the correction has gone.
     fn rest(&mut self, plain: f64, output: &mut VibrationOutput) {
-        self.position = plain;
+        let correction_um = self.part();
+        self.position = plain + 1e-3 * correction_um;
         let failed = self.phase == Phase::Failed;
         *output = VibrationOutput {
-            position_mm: plain,
+            position_mm: self.position,
+            correction_um,
             status: self.fault.code,
             message: self.fault.code,
             phase: if failed { GIB_VIBRATION_FAILED } else { GIB_VIBRATION_IDLE },
@@ -425,12 +462,27 @@ impl Vibration {
             let field = if input.scale_mm.is_finite() { "second_slide_mm\0" } else { "scale_mm\0" };
             self.fault = Fault { code: GIB_ERR_NON_FINITE, field, ..Fault::NONE };
             self.phase = Phase::Failed;
+            // The correction is still in the position, and goes from it as it does after any fault.
+            let relative = self.relative(self.known_now());
+            self.leaving += self.blend * relative;
+            self.leaves = self.leaves.max(relative.abs() * self.plan.fade);
             self.blend = 0.0;
         }
         let position = self.position;
         self.rest(position, output);
+        (self.position, output.position_mm) = (position, position);
         output.status = GIB_ERR_NON_FINITE;
         output.message = GIB_ERR_NON_FINITE;
+    }
+
+    /// Displacements of seat and bearing at the last angle.
+    fn known_now(&self) -> [f64; 2] {
+        if self.plan.integrate {
+            return self.held;
+        }
+        let wheel = self.spindle.wheel(PAIRS);
+        let [seat, bearing] = &self.displacement;
+        [(self.growth * seat.value(&wheel, PAIRS)).into(), (self.growth * bearing.value(&wheel, PAIRS)).into()]
     }
 
     #[cold]

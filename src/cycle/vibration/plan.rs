@@ -132,7 +132,8 @@ impl Plan {
         };
         if let Some(table) = table {
             table.check()?;
-            let last = table.points().last().map_or(1.0, |point| point.frequency_hz);
+            // Nothing is tracked beyond: cells up there would leave fewer for what is.
+            let last = table.points().last().map_or(1.0, |point| point.frequency_hz).min(NYQUIST / cycle);
             plan.cells = CELLS as f64 / (last * cycle);
             for (i, gain) in plan.gains.iter_mut().enumerate() {
                 let [[a, b], [c, d]] = table.gains(last * i as f64 / CELLS as f64);

@@ -11,6 +11,8 @@ use wide::f64x2;
 
 /// Largest change of speed at once that is the spindle's own, relative to the one for which the harmonics stand.
 const LEAP: f64 = 0.02;
+/// Leaps are forgotten when so much of half the rate is left of them.
+const LEAP_GONE: f64 = 1e-3;
 /// How far the speed may be from that one, relative to it: a speed varied by 10 % stays within for good.
 const BAND: f64 = 0.25;
 
@@ -29,8 +31,9 @@ pub struct Spindle {
     pub rate: f64,
     /// Turns in this cycle.
     pub turned: f64,
-    /// How much the rate changed in this cycle.
-    change: f64,
+    /// Part of the rate that leaps have brought: a glitch of the encoder, its grid, a cycle that came late. The filter forgets them, and
+    /// so does this; were a leap left out and its way back counted, what grows with the speed would grow with every leap.
+    leap: f64,
     /// The rate for which the harmonics stand, and its inverse.
     stand: f64,
     per_stand: f64,
@@ -73,16 +76,55 @@ impl Spindle {
         }
         // Flushes what decays towards zero before it is subnormal.
         let rate = (self.rate + plan.speed_share * (self.turned - self.rate) + 1e-12) - 1e-12;
-        self.change = rate - self.rate;
+        self.see_leap(plan, rate);
         self.rate = rate;
         good
+    }
+
+    /// A rate that comes: what leapt is no speed, and is forgotten as the filter does. No more than half of the rate, so that there is
+    /// always a speed of the same sign.
+    #[inline(always)]
+    fn see_leap(&mut self, plan: &Plan, rate: f64) {
+        // Before harmonics stand for a speed there is nothing to leap from.
+        if self.stand == 0.0 {
+            return;
+        }
+        let change = rate - self.rate;
+        let most = 0.5 * rate.abs();
+        self.leap -= plan.speed_share * self.leap;
+        if change.abs() > LEAP * self.stand.abs() {
+            self.leap += change;
+        } else if self.leap.abs() < LEAP_GONE * most {
+            self.leap = 0.0;
+        }
+        self.leap = self.leap.max(-most).min(most);
+    }
+
+    /// Turns per cycle without leaps, signed.
+    #[inline(always)]
+    #[must_use]
+    pub fn speed(&self) -> f64 {
+        self.rate - self.leap
+    }
+
+    /// Harmonics that can be followed at this speed. One beyond looks like one below in the samples, and would share what that one is.
+    #[must_use]
+    pub fn followed(&self, plan: &Plan) -> usize {
+        let most = f64::from(plan.tracked[1]) / self.rate.abs().max(1e-6);
+        plan.harmonics.min(most as usize)
+    }
+
+    /// Whether leaps are forgotten.
+    #[must_use]
+    pub fn calm(&self) -> bool {
+        self.leap == 0.0
     }
 
     /// How a displacement has grown since the harmonics stood, with the square of the speed.
     #[inline(always)]
     #[must_use]
     pub fn growth(&self) -> f32 {
-        let ratio = (self.rate * self.per_stand) as f32;
+        let ratio = (self.speed() * self.per_stand) as f32;
         ratio * ratio
     }
 
@@ -90,13 +132,14 @@ impl Spindle {
     #[inline(always)]
     #[must_use]
     pub fn change_since(&self, rate: f64) -> f64 {
-        (self.rate - rate) * self.per_stand
+        (self.speed() - rate) * self.per_stand
     }
 
     /// The harmonics stand for the present speed from now on.
     pub fn settle(&mut self, plan: &Plan) {
         // Where it does not turn, nothing is learnt that could grow.
-        (self.stand, self.per_stand) = (self.rate, if self.rate == 0.0 { 0.0 } else { 1.0 / self.rate });
+        let speed = self.speed();
+        (self.stand, self.per_stand) = (speed, if speed == 0.0 { 0.0 } else { 1.0 / speed });
         let stand = self.stand.abs();
         let band = (BAND * stand).min(0.5 * (plan.turn_max - stand));
         let leap = (LEAP * stand / plan.speed_share).min(plan.turn_max - stand - band);
@@ -107,13 +150,7 @@ impl Spindle {
     #[must_use]
     pub fn far(&self) -> bool {
         let [band, _] = self.bounds.to_array();
-        (self.rate - self.stand).abs() > band
-    }
-
-    /// Whether it changed in this cycle as no spindle does: a glitch of its encoder, or a cycle that came late.
-    #[must_use]
-    pub fn leapt(&self) -> bool {
-        self.change.abs() > LEAP * self.stand.abs()
+        (self.speed() - self.stand).abs() > band
     }
 
     /// Reads the angle of a usual cycle, which it is if its `bounded` is within `bounds`: the turn is then no larger than the

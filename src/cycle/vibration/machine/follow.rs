@@ -2,18 +2,12 @@
 //! that one makes them stand for another.
 
 use super::*;
-use crate::cycle::vibration::harmonic::grow;
 
 impl Vibration {
     /// The harmonics follow the speed.
     pub(super) fn follow(&mut self) {
-        let leapt = self.spindle.leapt();
-        if leapt {
-            self.renewal.rate = self.spindle.rate;
-        } else {
-            self.growth = self.spindle.growth();
-        }
-        if leapt || self.spindle.far() {
+        self.growth = self.spindle.growth();
+        if self.spindle.far() {
             self.settle();
         }
     }

@@ -10,7 +10,8 @@ use wide::f64x2;
 impl Vibration {
     /// Says whether the next cycle can be a usual one.
     pub(super) fn see_usual(&mut self) {
-        let calm = self.trackers.surprise == [0.0; 2] && self.sensors.live();
+        let calm =
+            self.trackers.surprise == [0.0; 2] && self.sensors.live() && self.spindle.calm() && self.leaving == 0.0;
         let known = self.revolution == f64::INFINITY && self.progress > 3.0;
         let simple = !self.plan.integrate && !self.plan.second_slide;
         let full = self.phase == Phase::Running && self.blend == 1.0;

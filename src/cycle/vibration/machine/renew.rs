@@ -16,6 +16,9 @@ const AT_ONCE: f32 = 0.8;
 /// Relative change of speed in a revolution up to which displacements change slowly.
 const STEADY: f64 = 1e-3;
 
+/// Turns that may go by from one slice to the next: all eight pairs, with the strongest in between, are 64.
+const ROUND: f64 = 0.08;
+
 /// Relative change of speed up to which factors hold.
 const FACTORS_HOLD: f64 = 0.02;
 
@@ -131,24 +134,28 @@ impl Vibration {
         // Averaged over a revolution.
         let turned = self.progress - now.last;
         let change = self.spindle.change_since(now.rate);
-        (now.last, now.rate) = (self.progress, self.spindle.rate);
+        (now.last, now.rate) = (self.progress, self.spindle.speed());
         let part = if turned > 0.0 && turned < 1.0 { turned } else { 1.0 };
         self.swing = (self.swing + change - self.swing * part + 1e-12) - 1e-12;
-        self.renewal.between = if self.swing.abs() < STEADY { 7 } else { 3 };
+        // Few cycles make a turn of a fast spindle: it must not go on for many while all pairs are renewed.
+        let most = if self.swing.abs() < STEADY { 7 } else { 3 };
+        let turning = self.spindle.rate.abs();
+        let fits = [7, 3, 1].into_iter().find(|between| f64::from(between + 1) * turning <= ROUND);
+        now.between = fits.map_or(0, |fits: u32| fits.min(most));
         self.trackers.keep_floor();
     }
 
     /// Whether the factors of a pair are those of another speed.
     #[inline(always)]
     fn stale(&self, pair: usize) -> bool {
-        let (factors, rate) = (&self.renewal.factors[pair], self.spindle.rate);
+        let (factors, rate) = (&self.renewal.factors[pair], self.spindle.speed());
         (factors.rate - rate).abs() > FACTORS_HOLD * rate.abs()
     }
 
     /// Factors of a pair at the present speed.
     #[inline(always)]
     fn find_factors(&mut self, pair: usize) {
-        let (plan, at) = (&self.plan, self.spindle.rate);
+        let (plan, at) = (&self.plan, self.spindle.speed());
         let turning = at.abs();
         let first = 2 * pair as i32 + 1;
         let number = Lanes::new([first as f32, first as f32, (first + 1) as f32, (first + 1) as f32]);
@@ -185,6 +192,7 @@ impl Vibration {
         if n == GIB_VIBRATION_SEAT && self.plan.second_slide {
             let slide = &mut self.slide.harmonics[0].0[pair];
             *slide = flushed(*slide, FLUSH) * kept;
+            self.slide.shares[n][pair] = kept;
             way -= *slide * used * Lanes::splat(1.0 / self.growth);
         }
         let share = self.trackers.shares[n][pair];
@@ -201,13 +209,14 @@ impl Vibration {
     #[inline(always)]
     fn believe(&mut self, n: usize, pair: usize) {
         let now = &self.renewal.factors[pair];
-        let (noise, used) = (now.noise, now.used);
+        let (noise, used, kept) = (now.noise, now.used, now.kept);
         let variance = self.trackers.variance()[n];
         let (share, known) = (&mut self.trackers.shares[n][pair], &mut self.known[n][pair]);
         let noise = noise * Lanes::splat(variance);
         let (now, shown) = (known.believed(noise * *share) * used, &mut self.displacement[n].0[pair]);
         *shown = flushed(*shown + Lanes::splat(AT_ONCE) * (now - *shown), FLUSH);
         let drift = SWING * self.swing.abs() as f32;
-        *share += (known.share(drift, noise, self.part) - *share) * used;
+        // What is left out learns nothing: it would take from a harmonic that looks the same in the samples.
+        *share = (*share + (known.share(drift, noise, self.part) - *share) * used) * kept;
     }
 }
