@@ -178,6 +178,7 @@ impl Learning {
             (self.force, self.steepest) = ([Cell::default(); ENTRIES], 0.0);
             self.best = [0.0; ENTRIES];
             self.lines = [Line::default(); GIB_LEARNING_HARMONICS];
+            self.seen = [0.0; ENTRIES];
             self.report.correction_um = 0.0;
         }
         self.plan = plan;
@@ -274,8 +275,10 @@ impl Learning {
             return self.blind();
         }
         if !self.busy() && !self.holds() {
-            (self.correction, self.presence) = (0.0, 0.0);
-            self.command = input.target_mm;
+            // What a load has left of a correction that was kept.
+            self.correction -= self.correction.max(-self.plan.slope).min(self.plan.slope);
+            self.presence = 0.0;
+            self.command = input.target_mm + 1e-3 * self.correction;
             return;
         }
         if input.flags != 0 && self.phase != Phase::Stopping {
@@ -402,7 +405,9 @@ impl Learning {
         self.presence = presence.clamp(0.0, 1.0);
         let place = Place::of(self.angle, self.plan.scale);
         let (now, next) = (place.read(&self.force), place.read(&self.coming));
-        let correction = self.presence * (now + self.blend * (next - now));
+        // From point to point it goes along tangents, which reach beyond the points' own bound.
+        let whole = (now + self.blend * (next - now)).max(-self.plan.most).min(self.plan.most);
+        let correction = self.presence * whole;
         let most = self.plan.slope;
         self.correction += (correction - self.correction).max(-most).min(most);
         self.correction = (self.correction + 1e-10) - 1e-10;

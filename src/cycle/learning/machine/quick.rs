@@ -83,7 +83,9 @@ impl Learning {
         // From a cell's line to the next one's it is at most two steps from point to point.
         let change = (3.0 * fastest * self.plan.scale + 2.0) * self.steepest;
         let behind = (Place::at(at).read(&self.force) - self.correction).abs();
-        let smooth = change + behind <= self.plan.slope;
+        // Half a point beyond any it is still within its bound, which a usual cycle does not look at.
+        let within = self.report.correction_um + 0.5 * self.steepest <= self.plan.most;
+        let smooth = within && change + behind <= self.plan.slope;
         if !(steady && smooth && self.reasons == 0 && self.presence == 1.0 && self.blend == 0.0 && cycles >= 1.0) {
             return;
         }
@@ -111,7 +113,8 @@ impl Learning {
             self.angle = fold(at / self.plan.scale - 0.5);
             self.progress += (usual.next - usual.first).abs() / self.plan.scale;
             self.cycles += u64::from(done);
-            self.correction = Place::at(at).read(&self.force);
+            // By the angle less whole turns: the last cycle may have been before one that was taken off since.
+            self.correction = Place::of(self.angle, self.plan.scale).read(&self.force);
         }
     }
 
@@ -175,7 +178,7 @@ impl Learning {
     /// Idle as long as it has never been started: the command is the target. False when that is no number.
     #[inline(always)]
     pub(super) fn idle(&mut self, input: &LearningInput, output: &mut LearningOutput) -> bool {
-        let sound = input.target_mm.abs() <= f64::MAX;
+        let sound = input.target_mm.abs() <= f64::MAX && self.correction == 0.0;
         if sound {
             self.command = input.target_mm;
             *output = LearningOutput { command_mm: input.target_mm, ..LearningOutput::default() };
