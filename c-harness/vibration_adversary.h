@@ -98,6 +98,8 @@ typedef struct {
 /* Sets up machine, configuration and troubles from one seed. */
 void vibration_adversary_init(vibration_adversary *a, uint64_t seed, vibration_mistake mistake);
 void vibration_adversary_run(vibration_adversary *a);
+/* Sum over the harmonics of the displacement times harmonic^power, of both parts or the larger, µm at the speed meant. */
+double vibration_adversary_swings(const vibration_adversary *a, int power, int largest);
 /* Whether a run met no trouble. */
 int vibration_adversary_clean(const vibration_adversary *a, int run);
 
