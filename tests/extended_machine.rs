@@ -280,6 +280,75 @@ fn impacts_may_be_a_little_other_than_believed_and_a_clearance_may_not() {
     }
 }
 
+/// What a ripple of the belief leaves is no ripple beside it: two of one period have no phases of their own.
+#[test]
+fn a_ripple_of_another_size_takes_the_place_of_the_believed_one() {
+    let ripple = |amplitude| Effect::Cogging { amplitude, period_mm: 2.5 };
+    for (seed, amplitude) in [(5, 0.18), (6, 0.13), (7, 0.06)] {
+        let d = judged(&rig(&[ripple(0.1)]), &recorded(&rig(&[ripple(amplitude)]), &test_moves(), seed));
+        let [Effect::Cogging { amplitude: found, period_mm }] = d.extended.effects[..] else {
+            panic!("{amplitude}: {:?} {:?}", d.extended.effects, d.notes)
+        };
+        assert!((found / amplitude - 1.0).abs() < 0.03 && (period_mm / 2.5 - 1.0).abs() < 1e-3, "{amplitude}: {found}");
+    }
+}
+
+/// Friction holds a load under any torque up to its own: a servo that begins without one moves on otherwise than one that has held the
+/// load. The torque column tells which, the position confirms it, and what is predicted of the torque does not know of it.
+#[test]
+fn the_closed_loop_begins_as_the_servo_did() {
+    let truth = rig(&[Effect::ConstantTorque { torque: 0.6 }]);
+    let recording = recorded(&truth, &test_moves(), 9);
+    let observed = Columns::of(&recording, &truth).unwrap().observed().unwrap();
+    let whole = predict(&truth, &observed).unwrap();
+    let closed = whole.closed_loop.unwrap();
+    let error = rms(closed.position.iter().zip(&observed.position).take(2000).map(|(replayed, x)| replayed - x));
+    assert!(error < 0.05e-3, "{error} mm");
+    let mut offset = observed.clone();
+    offset.torque.iter_mut().for_each(|torque| *torque += 0.2);
+    let other = predict(&truth, &offset).unwrap();
+    let pairs = whole.torque.torque.iter().zip(&other.torque.torque);
+    let most = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(most < 1e-3, "{most} N·m");
+}
+
+/// Behind a spring the table is where it is simulated, and its scale adds only noise.
+#[test]
+fn a_scale_adds_no_noise_to_the_torque_behind_a_spring() {
+    let spring = Effect::DriveCompliance {
+        resonance_hz: 80.0,
+        stiffness_n_um: 60.0,
+        table_inertia_share: 0.5,
+        table_friction_share: 0.6,
+        damping_ratio: 0.05,
+    };
+    let truth = rig(&[spring]);
+    let errors = [false, true].map(|scale| {
+        let recording = recorded_by(&truth, &test_moves(), 12, Sensors { grid_um: 0.5, ..good(0.01) }, scale);
+        let observed = Columns::of(&recording, &truth).unwrap().observed().unwrap();
+        let torque = predict(&truth, &observed).unwrap().torque.torque;
+        rms(torque.iter().zip(&observed.torque).map(|(predicted, measured)| predicted - measured))
+    });
+    assert!((errors[1] / errors[0] - 1.0).abs() < 1e-6, "{errors:?}");
+}
+
+/// A servo answers to the steps of its encoder. The slope of that answer goes with what the balance has of them through the inertia,
+/// as if the torque were early.
+#[test]
+fn what_a_servo_makes_of_the_encoder_s_grid_is_no_delay() {
+    let stiff = |effects: &[Effect]| {
+        let mut axis = rig(effects);
+        axis.servo = axis.servo.map(|servo| Servo { velocity_gain: 0.7, torque_time_constant_s: 0.0, ..servo });
+        axis
+    };
+    let drift = Effect::ThermalDrift { drop: 0.2, time_constant_s: 10.0, until_s: 1e9 };
+    for seed in [1, 2, 3] {
+        let sensors = Sensors { grid_um: 1.0, torque_grid: 0.0, ..good(0.02) };
+        let d = judged(&stiff(&[]), &recorded_by(&stiff(&[drift]), &test_moves(), seed, sensors, false));
+        assert_eq!(named(&d), vec![Cause::ThermalDrift], "{seed}: {:?}", d.findings);
+    }
+}
+
 /// A machine that is as believed has no discrepancy, also where its effects act on one another: friction at low speed or at a place
 /// builds up after a reversal as all dry friction does, and a table rests between its flanks. Moves, sweeps included, twice.
 #[test]

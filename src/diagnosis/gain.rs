@@ -113,6 +113,8 @@ fn in_judged_rows(errors: &Errors, weight: &[f64]) -> Errors {
 /// the others.
 pub struct HeldOut<'g, 'f, 'a> {
     axis: &'g Axis,
+    /// What of the axis stays beside what is found.
+    kept: &'g Axis,
     bench: &'g Bench<'f, 'a>,
     watch: &'g Watch<'g>,
     observed: Option<(Observed, ByServo)>,
@@ -125,7 +127,7 @@ pub struct HeldOut<'g, 'f, 'a> {
 impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
     /// Of every row of the recording.
     #[must_use]
-    pub fn new(axis: &'g Axis, columns: &Columns, bench: &'g Bench<'f, 'a>, watch: &'g Watch<'g>) -> Self {
+    pub fn new([axis, kept]: [&'g Axis; 2], columns: &Columns, bench: &'g Bench<'f, 'a>, watch: &'g Watch<'g>) -> Self {
         let mut observed = columns.observed();
         if let Some(observed) = observed.as_mut().filter(|_| columns.left_out > 0) {
             // What the axis did in between is not at hand, so that no loop can be replayed.
@@ -137,7 +139,7 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
             let servo = ByServo::of(axis, &observed);
             (observed, servo)
         });
-        Self { axis, bench, watch, observed, half, weight }
+        Self { axis, kept, bench, watch, observed, half, weight }
     }
 
     /// Errors of the belief alone; `None` where nothing can be predicted.
@@ -153,7 +155,7 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
     /// [`Stopped`] when the watch's caller said so.
     pub fn errors(&self, fit: &Fit) -> Result<Option<Errors>, Stopped> {
         let Some((observed, servo)) = &self.observed else { return Ok(None) };
-        let machines: Vec<Axis> = (0..2).map(|half| fitted_without(self.axis, self.bench, fit, half)).collect();
+        let machines: Vec<Axis> = (0..2).map(|half| fitted_without(self.kept, self.bench, fit, half)).collect();
         let of_half =
             self.watch.each(&machines, (0.92, 0.99), "measuring the gain", |axis| errors(axis, observed, servo))?;
         let (Some(Some(even)), Some(Some(odd))) = (of_half.first(), of_half.last()) else { return Ok(None) };
@@ -168,16 +170,16 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
     #[must_use]
     pub fn torque_error(&self, fit: &Fit) -> Option<f64> {
         let (observed, _) = self.observed.as_ref()?;
-        let prediction = predict_torque(&fitted_without(self.axis, self.bench, fit, NEITHER), observed).ok()?;
+        let prediction = predict_torque(&fitted_without(self.kept, self.bench, fit, NEITHER), observed).ok()?;
         let moving = torque_errors(observed, &prediction);
         let (sum, count) = moving.iter().filter(|e| e.is_finite()).fold((0.0, 0.0), |(s, n), e| (s + e * e, n + 1.0));
         (count > 0.0).then(|| f64::sqrt(sum / count))
     }
 
-    /// The axis, and its recording, every row, with what that says of the servo.
+    /// What of the axis stays, and its recording, every row, with what that says of the servo.
     #[must_use]
     pub fn recording(&self) -> Option<(&Axis, (&Observed, &ByServo))> {
-        self.observed.as_ref().map(|(observed, servo)| (self.axis, (observed, servo)))
+        self.observed.as_ref().map(|(observed, servo)| (self.kept, (observed, servo)))
     }
 
     /// Errors by which a law may be refuted.

@@ -29,10 +29,17 @@ const SURELY: f64 = 2.0;
 /// tone below the filter, and looks like a torque.
 #[must_use]
 pub fn unseen_by_floor(frame: &Frame) -> f64 {
+    let made = through_inertia(frame);
+    (mean_square(&made) - frame.floor(&made, true).powi(2)).max(0.0).sqrt()
+}
+
+/// What the encoder's grid makes in the torque balance through the inertia, at the judged rows as they count; nothing without a
+/// grid.
+fn through_inertia(frame: &Frame) -> Vec<f64> {
     let columns = frame.columns;
     let encoder = Sensor::encoder(columns);
     if encoder.grid <= 0.0 {
-        return 0.0;
+        return Vec::new();
     }
     let error = Place::of(frame, &columns.position).error_of(&encoder, 0.0);
     let per = frame.belief.inertia * frame.unit / columns.period_s.powi(2);
@@ -42,7 +49,19 @@ pub fn unseen_by_floor(frame: &Frame) -> f64 {
     };
     let mut made = frame.low_passed(&(0..error.len()).map(bend).collect::<Vec<_>>());
     made.iter_mut().zip(&frame.weights).for_each(|(made, weight)| *made *= weight);
-    (mean_square(&made) - frame.floor(&made, true).powi(2)).max(0.0).sqrt()
+    made
+}
+
+/// By how much the torque column may seem early or late by the encoder's grid, s. The servo answers to the grid's error e with
+/// −Kv·ė, whose slope goes with the J·ë that the balance has of it: Kv/J·mean (J·ë)² over mean Ṫ². 0 without a servo.
+#[must_use]
+pub fn delay_s(frame: &Frame) -> f64 {
+    let Some(servo) = &frame.axis.servo else { return 0.0 };
+    let half = 0.5 * frame.columns.period_s;
+    let (after, before) = (frame.torque(half), frame.torque(-half));
+    let sides = after.iter().zip(&before).zip(&frame.weights);
+    let slope: Vec<f64> = sides.map(|((after, before), weight)| weight * (after - before) / (2.0 * half)).collect();
+    servo.velocity_gain / frame.belief.inertia * mean_square(&through_inertia(frame)) / mean_square(&slope).max(1e-300)
 }
 
 /// What the grids of encoder and scale make in table − encoder, RMS over the judged rows, load units; 0 without a scale. It
@@ -102,11 +121,11 @@ impl Place {
     }
 }
 
-/// A part that may well be the grids': one in table − encoder, or a ripple of the torque; `without` are the fits without each
+/// A part that may well be the grids': one in table − encoder, a ripple of the torque, or its delay; `without` are the fits without each
 /// part.
 #[must_use]
 pub fn imitated(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
-    imitated_torque(bench, fit).or_else(|| imitated_table(bench, without, fit))
+    imitated_torque(bench, fit).or_else(|| imitated_delay(bench, fit)).or_else(|| imitated_table(bench, without, fit))
 }
 
 /// A ripple of the torque that is no larger than what the encoder's grid makes through the inertia.
@@ -117,6 +136,12 @@ fn imitated_torque(bench: &Bench, fit: &Fit) -> Option<usize> {
         let own = &fit.contribution(i)[..bench.rows];
         dot(own, own) < bench.rows as f64 * least * least
     })
+}
+
+/// A delay that is no longer than what the encoder's grid makes of itself under the servo, which goes with the square of that error.
+fn imitated_delay(bench: &Bench, fit: &Fit) -> Option<usize> {
+    let part = fit.parts.iter().position(|part| part.law.cause == Cause::DeadTime)?;
+    (1e-3 * fit.parts[part].shape[0].abs() < SURELY * SURELY * delay_s(bench.frame)).then_some(part)
 }
 
 fn imitated_table(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {

@@ -69,10 +69,10 @@ pub struct Judged {
 }
 
 impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
-    /// A judge of what is found on a bench about an axis; `whole` is the recording, every row.
+    /// A judge of what is found on a bench about an axis, and beside what is kept of it; `whole` is the recording, every row.
     #[must_use]
-    pub fn new(axis: &'j Axis, whole: &Columns, bench: &'j Bench<'f, 'a>, watch: &'j Watch<'j>) -> Self {
-        let (held_out, empty) = (HeldOut::new(axis, whole, bench, watch), bench.fit(Vec::new()));
+    pub fn new(axes: [&'j Axis; 2], whole: &Columns, bench: &'j Bench<'f, 'a>, watch: &'j Watch<'j>) -> Self {
+        let (held_out, empty) = (HeldOut::new(axes, whole, bench, watch), bench.fit(Vec::new()));
         let believed = held_out.believed();
         Self { bench, watch, held_out, empty, believed }
     }

@@ -144,7 +144,9 @@ fn regressors(frame: &Frame, effect: &Effect, shape: Vec<f64>) -> Vec<Trace> {
     (law(effect.cause()).terms)(frame, &[shape]).swap_remove(0).regressors
 }
 
-fn has_phase(effect: &Effect) -> bool {
+/// Whether an effect is periodic: its phase is the recording's own.
+#[must_use]
+pub fn has_phase(effect: &Effect) -> bool {
     use Effect::*;
     matches!(effect, Cogging { .. } | ExternalVibration { .. } | ScrewPeriodicError { .. })
 }

@@ -11,6 +11,7 @@ use super::blocks;
 use super::causes::table_side;
 use super::causes::thermal_drift::SLOWEST;
 use super::fit::{Bench, Fit, Part, Slope, pseudo_inverse};
+use super::grids;
 use super::many::dot;
 use crate::machine::{Cause, Effect};
 use nalgebra::{DMatrix, DVector};
@@ -189,7 +190,8 @@ pub fn effects(bench: &Bench, fit: &Fit, sure: Option<&Sure>) -> Vec<Option<(Eff
             let mut deviations: Vec<f64> = (0..values.len()).map(deviation).collect();
             match (effect, deviations.as_mut_slice()) {
                 (Effect::DeadTime { .. }, [deviation]) => {
-                    *deviation = deviation.hypot(1e3 * bench.frame.sampling.deviation_s());
+                    let by_frame = bench.frame.sampling.deviation_s().hypot(grids::delay_s(bench.frame));
+                    *deviation = deviation.hypot(1e3 * by_frame);
                 }
                 (Effect::DriveCompliance { .. }, [.., deviation]) => {
                     *deviation = deviation.hypot(table_side::open_damping(bench.frame, &effect));

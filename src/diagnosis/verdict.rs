@@ -161,8 +161,13 @@ fn answer(recorded: &Recorded, frame: &Frame, notes: Vec<String>) -> Result<Diag
     let bench = Bench::new(frame, &Known::of(recorded.belief, frame));
     let found = answer_on(recorded, &bench, None, notes.clone())?;
     let Recorded { axis, belief, .. } = recorded;
-    if matches!(found.verdict, Verdict::UnknownCause | Verdict::NoDiscrepancy) && axis == belief {
-        if let Some(belief) = &reopened::without_misjudged(axis, frame, &bench) {
+    if axis == belief && !axis.effects.is_empty() {
+        let named: Vec<Effect> = found.findings.iter().map(|finding| finding.effect).collect();
+        let misjudged = match found.verdict {
+            Verdict::UnknownCause | Verdict::NoDiscrepancy => reopened::without_misjudged(axis, frame, &bench),
+            _ => reopened::without_found_again(axis, frame, &named),
+        };
+        if let Some(belief) = &misjudged {
             let again = answer(&Recorded { belief, ..*recorded }, frame, notes.clone())?;
             if !again.findings.is_empty() {
                 return Ok(again);
@@ -192,7 +197,7 @@ fn answer_on(
     let frame = bench.frame;
     let empty = bench.fit(Vec::new());
     let laws: Vec<&'static Law> = LAWS.iter().copied().filter(|law| belief::may_be_found(belief, law.cause)).collect();
-    let judge = || Ok(Judge::new(axis, whole, bench, watch));
+    let judge = || Ok(Judge::new([axis, belief], whole, bench, watch));
     let (judge, search) = watch.both(judge, || Search::new(bench, &laws, watch))?;
     let found = search.from_belief()?;
     if let Some(late_s) = uncertainty::late_by_sampling(bench, &found.fit) {
@@ -218,8 +223,8 @@ fn answer_on(
         judged.selection.fit = replayed.fit;
         replayed.sure
     });
-    let mut findings = findings(axis, bench, &judged.selection, sure.as_ref(), &empty);
-    let mut extended = extended_by(axis, &findings);
+    let mut findings = findings(belief, bench, &judged.selection, sure.as_ref(), &empty);
+    let mut extended = extended_by(belief, &findings);
     if let Some(holdout) = holdout {
         match Columns::of(holdout, axis).map(|columns| (columns.notes(holdout, axis), Holdout::new(axis, columns))) {
             Ok((note, Some(holdout))) => {

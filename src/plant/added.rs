@@ -54,6 +54,8 @@ pub struct ByServo {
     pub(super) speed: CommandSpeed,
     /// What was added to the servo's torque by the usual speed, and by the one that it seems to take where that is another.
     pub(super) added: [Option<Added>; 2],
+    /// Torque that the servo held in the first row, see [`ByLaw::held_at_start`].
+    pub(super) held_at_start: Option<f64>,
 }
 
 impl ByServo {
@@ -64,7 +66,8 @@ impl ByServo {
         let speed = command_speed(&laws);
         let by = |speed| laws.iter().find(|law| law.speed == speed).and_then(ByLaw::added);
         let other = (speed != CommandSpeed::Central).then(|| by(speed)).flatten();
-        Self { speed, added: [by(CommandSpeed::Central), other] }
+        let held_at_start = laws.iter().find(|law| law.speed == speed).and_then(ByLaw::held_at_start);
+        Self { speed, added: [by(CommandSpeed::Central), other], held_at_start }
     }
 }
 
@@ -181,6 +184,13 @@ impl<'o> ByLaw<'o> {
             sums[(cycle - first) / block] += beyond.clamp(-most, most).powi(2);
         }
         sums
+    }
+
+    /// Torque that the servo held in the first row: what its integral had come to by then is between the law and the torque column
+    /// ever after, so that all rows tell it. `None` of a servo that keeps no integral.
+    fn held_at_start(&self) -> Option<f64> {
+        self.servo.velocity_integral_time_s?;
+        Some(self.observed.torque.first()? + self.level).filter(|torque| torque.is_finite())
     }
 
     /// What was added by this law; `None` where nothing was, or where it may be the law that is wrong.

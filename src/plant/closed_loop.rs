@@ -71,6 +71,7 @@ fn replayed(
     servo: &ByServo,
 ) -> Result<Prediction, String> {
     let rest = rows_at_rest(observed);
+    let begun = Begun::of(axis, observed, &mut torque, &rest, servo)?;
     let replay = |speed, added| Replay::felt(axis, observed, &torque, &rest, speed, added);
     let mut best = replay(CommandSpeed::Central, servo.added[0].as_ref())?;
     if servo.speed != CommandSpeed::Central {
@@ -87,6 +88,9 @@ fn replayed(
         return Ok(Prediction { torque, closed_loop: None, added: None, command_speed });
     };
     for (row, at_rest) in rest.into_iter().flatten().zip(torque_at_rest) {
+        torque.torque[row] = at_rest;
+    }
+    for (row, at_rest) in begun.into_iter().flat_map(|begun| begun.rest.into_iter().flatten().zip(begun.torque)) {
         torque.torque[row] = at_rest;
     }
     Ok(Prediction { torque, closed_loop: Some(replayed), added: added.map(|added| added.pulses), command_speed })
@@ -180,6 +184,51 @@ impl Part {
         let rows = step_s.map_or(0.0, |step_s| most as f64 * step_s / observed.period_s);
         Self { rows: whole.rows.min(rows as usize), ..whole }
     }
+}
+
+/// Times of the servo, 1/Kp and Ti, for which the axis has moved when nothing is left of how its servo began.
+const FORGOTTEN: f64 = 8.0;
+
+/// The torque in the first rows at rest by what the machine itself says of its beginning, where the servo began otherwise.
+struct Begun {
+    rest: Vec<Range<usize>>,
+    torque: Vec<f64>,
+}
+
+impl Begun {
+    /// Lets the servo begin with the torque that it held by the recorded one, if the position is then repeated better: an axis at rest
+    /// may be held by any torque up to its friction. What is predicted of the torque knows nothing of that.
+    fn of(
+        axis: &Axis,
+        observed: &Observed,
+        torque: &mut TorquePrediction,
+        rest: &[Range<usize>],
+        servo: &ByServo,
+    ) -> Result<Option<Self>, String> {
+        let (Some(held), Some(law)) = (servo.held_at_start, &axis.servo) else { return Ok(None) };
+        let times = law.position_gain_1_s.recip() + law.velocity_integral_time_s.unwrap_or(0.0);
+        let rows = rows_in_motion(observed, FORGOTTEN * times);
+        let part = Part { rows, ..Part::whole(observed) };
+        let rest: Vec<Range<usize>> =
+            rest.iter().map(|range| range.start..range.end.min(rows)).filter(|range| !range.is_empty()).collect();
+        let begins = |torque: &TorquePrediction| replay(axis, observed, torque, &rest, &[], servo.speed, part);
+        let by_itself = begins(torque)?;
+        let itself = std::mem::replace(&mut torque.at_start, held);
+        let (Some((alone, at_rest)), Some((with, _))) = (by_itself, begins(torque)?) else { return Ok(None) };
+        if error_of(observed, &with) < error_of(observed, &alone) {
+            return Ok(Some(Self { rest, torque: at_rest }));
+        }
+        torque.at_start = itself;
+        Ok(None)
+    }
+}
+
+/// Rows until the axis has moved for so many seconds; all, if it never has.
+fn rows_in_motion(observed: &Observed, seconds: f64) -> usize {
+    let slow = observed.motion.standing_speed();
+    let moving = observed.motion.velocities().enumerate().filter(|(_, v)| v.abs() > slow);
+    let mut moving = moving.skip((seconds / observed.period_s).ceil() as usize);
+    moving.next().map_or(observed.time_s.len(), |(row, _)| row)
 }
 
 /// A recording replayed at one speed of the command.

@@ -3,7 +3,7 @@
 //! Uses the motion of the whole recording (zero-phase) and never its torque, except for the phase of periodic terms,
 //! which is estimated from the first quarter of the rows. Dry friction at rest is not a function of the motion: it is
 //! carried over a standstill and turned round over a small travel, the one the machine says (pre-sliding) or the smallest
-//! that the position can tell. Where clearance or spring stand between motor and table, the table's motion is that of its
+//! that the position can tell. Where a clearance stands between motor and table, the table's motion is that of its
 //! scale; without a scale the table is simulated behind the measured motor.
 //!
 //! Sampling: a row holds the torque at the end of a cycle, before the servo answers to that row. The servo held its command
@@ -95,8 +95,10 @@ fn needed_torque(physics: &Physics, observed: &Observed, run: Range<usize>) -> V
     let smallest = (3.0 * motion.resolution * scale).max(1e-9 * scale);
     let travel = physics.presliding.unwrap_or(0.0).max(smallest);
     let mut transmitted = physics.two_masses.map(|masses| {
-        measured_table_torque(physics, masses, observed, run.clone())
-            .unwrap_or_else(|| table_torque(physics, masses, observed, run.clone()))
+        // Behind a spring a table that is simulated goes where its scale has it, without the noise of that; which flank one lies
+        // against goes with all that was before.
+        let scale = (masses.clearance > 0.0).then(|| measured_table_torque(physics, masses, observed, run.clone()));
+        scale.flatten().unwrap_or_else(|| table_torque(physics, masses, observed, run.clone()))
     });
     let (inertia, share) = match &physics.two_masses {
         Some(masses) => (masses.motor_inertia, 1.0 - masses.table_friction_share),

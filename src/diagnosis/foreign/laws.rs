@@ -29,7 +29,7 @@ impl Foreign {
     }
 }
 
-pub static LAWS: [Foreign; 24] = [
+pub static LAWS: [Foreign; 26] = [
     Foreign {
         goes: "with the cube of speed",
         numbers: 1,
@@ -180,6 +180,18 @@ pub static LAWS: [Foreign; 24] = [
         numbers: LEVELS,
         somewhere: false,
         regressors: |frame, _| any_form(frame, |i| frame.x[i], |i| frame.a[i]),
+    },
+    Foreign {
+        goes: "as a drag that changes along the stroke",
+        numbers: LEVELS,
+        somewhere: false,
+        regressors: |frame, _| any_form(frame, |i| frame.x[i], |i| frame.v[i]),
+    },
+    Foreign {
+        goes: "as a motor that pushes harder at one time than at another",
+        numbers: LEVELS,
+        somewhere: false,
+        regressors: |frame, _| any_form(frame, |i| frame.seconds(i), |i| load(frame, i)),
     },
     Foreign {
         goes: "along the stroke, one way there and another way back",
