@@ -8,7 +8,7 @@
 
 #include "gib.h"
 #include "plant.h"
-#include "troubles.h"
+#include "adversary.h"
 
 typedef enum {
     BACKLASH_TORQUE_STUCK,
@@ -64,16 +64,15 @@ typedef enum {
 enum { BACKLASH_MOST_TROUBLES = 3, BACKLASH_MEMORY = 131072, BACKLASH_LATEST = 16 };
 
 typedef struct {
+    adversary base;
     plant_config c;
     gib_backlash_config config;
-    troubles troubles;
     int answer_cycles;
     double truth_um, old_um, longest; /* lost motion; amount at the start; cycles that a run may take */
     backlash_mistake mistake;
-    uint64_t random;
     /* of a run */
     plant axis;
-    int run, cycle, ended, named;
+    int named;
     uint32_t asked_id, done_id, counted; /* requests asked for, carried out, made before this run */
     int asked_at;
     double foreign_um; /* amount that somebody else set */
@@ -85,8 +84,6 @@ typedef struct {
     /* of each run: how it ended, and what it found */
     int32_t status[2];
     gib_backlash_report report[2];
-    const char *broken; /* first law broken, or NULL */
-    int broken_at;
 } backlash_adversary;
 
 /* Sets up axis, configuration and troubles from one seed. */

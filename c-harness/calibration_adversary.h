@@ -7,7 +7,7 @@
 #define CALIBRATION_ADVERSARY_H
 
 #include "gib.h"
-#include "troubles.h"
+#include "adversary.h"
 
 typedef enum {
     CALIBRATION_SENSOR_STUCK, /* one of seat, bearing and ball bar; so for all of a sensor */
@@ -57,14 +57,13 @@ typedef enum {
 enum { CALIBRATION_MOST_TROUBLES = 3, CALIBRATION_MEMORY = 32768 };
 
 typedef struct {
+    adversary base;
     gib_calibration_config config;
-    troubles troubles;
     calibration_mistake mistake;
-    uint64_t random;
     /* Servo, 1/s; seat and bearing: their springs, what of the slide's acceleration they take; gains of the sensors and their noise. */
     double bandwidth, spring[2], damping[2], takes[2], gain[2], noise[3], mass, torque_unit;
     /* of a run */
-    int run, cycle, ended, named, in_phase;
+    int named, in_phase;
     double start_mm, origin_mm, command, slide[3], part[2][2], acceleration[2], seen[2], stuck[5], goal_mm[2];
     gib_calibration_input told;
     gib_calibration_output out, before, earlier;
@@ -73,8 +72,6 @@ typedef struct {
     gib_calibration_table table[2];
     double worst[2]; /* error of a gain over what is allowed */
     int held[2], known[2];
-    const char *broken; /* first law broken, or NULL */
-    int broken_at;
 } calibration_adversary;
 
 /* Sets up machine, configuration and troubles from one seed. */

@@ -7,7 +7,7 @@
 #define INERTIA_ADVERSARY_H
 
 #include "spindle_run.h"
-#include "troubles.h"
+#include "adversary.h"
 
 typedef enum {
     INERTIA_TORQUE_STUCK,
@@ -60,15 +60,14 @@ typedef enum {
 enum { INERTIA_MOST_TROUBLES = 3, INERTIA_MEMORY = 32768, INERTIA_LATEST = 16 };
 
 typedef struct {
+    adversary base;
     spindle_config plant[2]; /* of the first process step and the next */
     gib_inertia_config config[2];
-    troubles troubles;
     double start_rpm;
     inertia_mistake mistake;
-    uint64_t random;
     /* of a run */
     spindle s;
-    int run, cycle, ended, named;
+    int named;
     spindle_reading stuck, late[INERTIA_LATEST];
     double first_rpm, refused_rpm, command_rpm;
     double extra; /* time that was longer than its cycles, over that of the cycles */
@@ -80,8 +79,6 @@ typedef struct {
     gib_inertia_report report[2];
     double error[2];
     gib_error_detail detail[2];
-    const char *broken; /* first law broken, or NULL */
-    int broken_at;
 } inertia_adversary;
 
 /* Sets up spindle, configuration and troubles from one seed. */

@@ -10,7 +10,7 @@
 #define LEARNING_ADVERSARY_H
 
 #include "gib.h"
-#include "troubles.h"
+#include "adversary.h"
 
 typedef enum {
     LEARNING_DETECTED_STUCK,
@@ -62,15 +62,14 @@ typedef enum {
 enum { LEARNING_MOST_TROUBLES = 3, LEARNING_MEMORY = 131072, LEARNING_FORM = 16 };
 
 typedef struct {
+    adversary base;
     gib_learning_config config;
-    troubles troubles;
     learning_mistake mistake;
-    uint64_t random;
     double turn_cycles, w, damping, gain, noise_mm, grid_mm, counts, lag_um; /* a cycle; of the servo; the sensor; what it lags behind */
     double coefficient[LEARNING_FORM][2];
     int form, wrapped;
     /* of a run */
-    int run, cycle, cycles, waits, out_cycles, after, in_phase;
+    int cycles, waits, out_cycles, after, in_phase;
     double angle, rate, angle_added, tool[2], seen, command, stuck[2], target, squares[3], held_from;
     gib_learning_input told;
     gib_learning_output out, before;
@@ -79,8 +78,6 @@ typedef struct {
     gib_learning_report report[2];
     gib_learning_point points[2][1024];
     double first[2], last[2]; /* deviation without and with what was learnt, µm rms over two turns */
-    const char *broken; /* first law broken, or NULL */
-    int broken_at;
 } learning_adversary;
 
 /* Sets up servo, configuration and troubles from one seed. */

@@ -16,22 +16,22 @@ static const char *run(uint64_t seed, int mistake)
 {
     backlash_adversary_init(&a, seed, (backlash_mistake)mistake);
     backlash_adversary_run(&a);
-    return a.broken;
+    return a.base.broken;
 }
 
 static void describe(void)
 {
-    const gib_backlash_report *r = &a.report[a.run];
-    print_message("run %d, cycle %d (named in %d), cycle %g ms, mode %d: %s; found %.2f um +- %.2f of %.2f\n", a.run + 1, a.broken_at,
-                  a.named, 1e3 * a.config.cycle_s, (int)a.config.mode, gib_status_text(a.status[a.run]), r->mean.lost_motion_um,
-                  r->mean.uncertainty_um, a.truth_um);
-    troubles_print(&a.troubles, backlash_trouble_names);
+    const gib_backlash_report *r = &a.report[a.base.run];
+    print_message("run %d, cycle %d (named in %d), cycle %g ms, mode %d: %s; found %.2f um +- %.2f of %.2f\n", a.base.run + 1,
+                  a.base.broken_at, a.named, 1e3 * a.config.cycle_s, (int)a.config.mode, gib_status_text(a.status[a.base.run]),
+                  r->mean.lost_motion_um, r->mean.uncertainty_um, a.truth_um);
+    troubles_print(&a.base.troubles, backlash_trouble_names);
 }
 
 static void count(adversary_tally *t)
 {
-    t->met += troubles_met(&a.troubles);
-    for (int run = 0; run <= a.run; run++) {
+    t->met += troubles_met(&a.base.troubles);
+    for (int run = 0; run <= a.base.run; run++) {
         int clean = backlash_adversary_clean(&a, run), value = a.status[run] == GIB_DONE;
         const gib_backlash_estimate *found = &a.report[run].mean;
         t->ended += value;

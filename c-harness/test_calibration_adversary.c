@@ -11,22 +11,22 @@ static const char *run(uint64_t seed, int mistake)
 {
     calibration_adversary_init(&a, seed, (calibration_mistake)mistake);
     calibration_adversary_run(&a);
-    return a.broken;
+    return a.base.broken;
 }
 
 static void describe(void)
 {
-    const gib_calibration_point *q = &a.table[a.run].point[0];
-    print_message("run %d, cycle %d (named in %d), cycle %g ms, phase %d: %s; gains %.3f %.3f +- %.3f %.3f of %.3f %.3f\n", a.run + 1,
-                  a.broken_at, a.named, 1e3 * a.config.cycle_s, a.out.phase, gib_status_text(a.status[a.run]), q->gain_ratio[0],
+    const gib_calibration_point *q = &a.table[a.base.run].point[0];
+    print_message("run %d, cycle %d (named in %d), cycle %g ms, phase %d: %s; gains %.3f %.3f +- %.3f %.3f of %.3f %.3f\n", a.base.run + 1,
+                  a.base.broken_at, a.named, 1e3 * a.config.cycle_s, a.out.phase, gib_status_text(a.status[a.base.run]), q->gain_ratio[0],
                   q->gain_ratio[1], q->gain_uncertainty_ratio[0], q->gain_uncertainty_ratio[1], 1.0 / a.gain[0], 1.0 / a.gain[1]);
-    troubles_print(&a.troubles, calibration_trouble_names);
+    troubles_print(&a.base.troubles, calibration_trouble_names);
 }
 
 static void count(adversary_tally *t)
 {
-    t->met += troubles_met(&a.troubles);
-    for (int run = 0; run <= a.run; run++) {
+    t->met += troubles_met(&a.base.troubles);
+    for (int run = 0; run <= a.base.run; run++) {
         int clean = calibration_adversary_clean(&a, run);
         t->ended += a.status[run] == GIB_DONE;
         t->clean += clean;

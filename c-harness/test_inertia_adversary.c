@@ -14,22 +14,22 @@ static const char *run(uint64_t seed, int mistake)
 {
     inertia_adversary_init(&a, seed, (inertia_mistake)mistake);
     inertia_adversary_run(&a);
-    return a.broken;
+    return a.base.broken;
 }
 
 static void describe(void)
 {
     print_message("run %d, cycle %d of %d (named in %d), cycle %g ms: status %d, result %d, %s %g; off by %.2f %%, said %.2f %%\n",
-                  a.run + 1, a.broken_at, a.ended, a.named, 1e3 * a.config[0].cycle_s, (int)a.status[a.run], (int)a.result[a.run],
-                  a.detail[a.run].field ? a.detail[a.run].field : "", a.detail[a.run].value, 100.0 * a.error[a.run],
-                  100.0 * a.report[a.run].total_uncertainty_kg_m2 / a.plant[a.run].inertia_kg_m2);
-    troubles_print(&a.troubles, inertia_trouble_names);
+                  a.base.run + 1, a.base.broken_at, a.base.ended, a.named, 1e3 * a.config[0].cycle_s, (int)a.status[a.base.run],
+                  (int)a.result[a.base.run], a.detail[a.base.run].field ? a.detail[a.base.run].field : "", a.detail[a.base.run].value,
+                  100.0 * a.error[a.base.run], 100.0 * a.report[a.base.run].total_uncertainty_kg_m2 / a.plant[a.base.run].inertia_kg_m2);
+    troubles_print(&a.base.troubles, inertia_trouble_names);
 }
 
 static void count(adversary_tally *t)
 {
-    t->met += troubles_met(&a.troubles);
-    for (int run = 0; run <= a.run; run++) {
+    t->met += troubles_met(&a.base.troubles);
+    for (int run = 0; run <= a.base.run; run++) {
         /* A spindle whose own inertia is said to be larger is no fault of the measurement's. */
         int clean = inertia_adversary_clean(&a, run) && a.status[run] == GIB_DONE && a.result[run] != GIB_ERR_INERTIA_OWN;
         int value = a.result[run] == GIB_OK;

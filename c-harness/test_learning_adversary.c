@@ -11,22 +11,23 @@ static const char *run(uint64_t seed, int mistake)
 {
     learning_adversary_init(&a, seed, (learning_mistake)mistake);
     learning_adversary_run(&a);
-    return a.broken;
+    return a.base.broken;
 }
 
 static void describe(void)
 {
-    const gib_learning_report *r = &a.report[a.run];
-    print_message("run %d, cycle %d, %s, %.3g cycles of %.3g ms a turn, phase %d: %s; %.3g um at first, %.3g in the end, tolerance %.3g, %d updates\n",
-                  a.run + 1, a.broken_at, a.config.method ? "published" : "filtered", a.turn_cycles, 1e3 * a.config.cycle_s, a.out.phase,
-                  gib_status_text(a.out.message), a.first[a.run], a.last[a.run], a.config.tolerance_um, r->updates);
-    troubles_print(&a.troubles, learning_trouble_names);
+    const gib_learning_report *r = &a.report[a.base.run];
+    print_message("run %d, cycle %d, %s, %.3g cycles of %.3g ms a turn, phase %d: %s; %.3g um at first, %.3g in the end, tolerance %.3g, "
+                  "%d updates\n",
+                  a.base.run + 1, a.base.broken_at, a.config.method ? "published" : "filtered", a.turn_cycles, 1e3 * a.config.cycle_s,
+                  a.out.phase, gib_status_text(a.out.message), a.first[a.base.run], a.last[a.base.run], a.config.tolerance_um, r->updates);
+    troubles_print(&a.base.troubles, learning_trouble_names);
 }
 
 static void count(adversary_tally *t)
 {
-    t->met += troubles_met(&a.troubles);
-    for (int run = 0; run <= a.run; run++) {
+    t->met += troubles_met(&a.base.troubles);
+    for (int run = 0; run <= a.base.run; run++) {
         int clean = learning_adversary_clean(&a, run), done = a.status[run] == GIB_DONE;
         t->ended += done;
         t->clean += clean;

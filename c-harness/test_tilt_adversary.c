@@ -12,18 +12,19 @@ static const char *run(uint64_t seed, int mistake)
 {
     tilt_adversary_init(&a, seed, (tilt_mistake)mistake);
     tilt_adversary_run(&a);
-    return a.broken;
+    return a.base.broken;
 }
 
 static void describe(void)
 {
-    const gib_tilt_report *r = &a.report[a.run];
-    print_message("run %d, cycle %d (named in %d), cycle %g ms, phase %d: %s (%s %g); found %.4f deg +- %.4f of %.4f, x %.4f y %.4f of %.4f %.4f, passes %d %s, left %.4f\n",
-                  a.run + 1, a.broken_at, a.named, 1e3 * a.config.cycle_s, a.out.phase, gib_status_text(a.status[a.run]),
-                  a.detail[a.run].field ? a.detail[a.run].field : "", a.detail[a.run].value, r->tilt_deg, r->uncertainty_deg,
-                  tilt_adversary_truth(&a, a.run, -1), r->about_x_deg, r->about_y_deg, tilt_adversary_truth(&a, a.run, 0),
-                  tilt_adversary_truth(&a, a.run, 1), a.passes, a.config.method ? "two points" : "", a.left_mm[a.run]);
-    troubles_print(&a.troubles, tilt_trouble_names);
+    const gib_tilt_report *r = &a.report[a.base.run];
+    print_message("run %d, cycle %d (named in %d), cycle %g ms, phase %d: %s (%s %g); found %.4f deg +- %.4f of %.4f, x %.4f y %.4f of "
+                  "%.4f %.4f, passes %d %s, left %.4f\n",
+                  a.base.run + 1, a.base.broken_at, a.named, 1e3 * a.config.cycle_s, a.out.phase, gib_status_text(a.status[a.base.run]),
+                  a.detail[a.base.run].field ? a.detail[a.base.run].field : "", a.detail[a.base.run].value, r->tilt_deg, r->uncertainty_deg,
+                  tilt_adversary_truth(&a, a.base.run, -1), r->about_x_deg, r->about_y_deg, tilt_adversary_truth(&a, a.base.run, 0),
+                  tilt_adversary_truth(&a, a.base.run, 1), a.passes, a.config.method ? "two points" : "", a.left_mm[a.base.run]);
+    troubles_print(&a.base.troubles, tilt_trouble_names);
 }
 
 static int found(const gib_tilt_report *r)
@@ -33,8 +34,8 @@ static int found(const gib_tilt_report *r)
 
 static void count(adversary_tally *t)
 {
-    t->met += troubles_met(&a.troubles);
-    for (int run = 0; run <= a.run; run++) {
+    t->met += troubles_met(&a.base.troubles);
+    for (int run = 0; run <= a.base.run; run++) {
         const gib_tilt_report *r = &a.report[run];
         int clean = tilt_adversary_clean(&a, run), value = found(r);
         t->ended += a.status[run] == GIB_DONE;

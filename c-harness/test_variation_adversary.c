@@ -11,19 +11,19 @@ static const char *run(uint64_t seed, int mistake)
 {
     variation_adversary_init(&a, seed, (variation_mistake)mistake);
     variation_adversary_run(&a);
-    return a.broken;
+    return a.base.broken;
 }
 
 static void describe(void)
 {
-    print_message("run %d, cycle %d (ended from %d), cycle %g ms: %s; the meter took %.0f %% of what it may exceed\n", a.run + 1,
-                  a.broken_at, a.named, 1e3 * a.config.cycle_s, gib_status_text(a.out.status), 100.0 * a.worst);
-    troubles_print(&a.troubles, variation_trouble_names);
+    print_message("run %d, cycle %d (ended from %d), cycle %g ms: %s; the meter took %.0f %% of what it may exceed\n", a.base.run + 1,
+                  a.base.broken_at, a.named, 1e3 * a.config.cycle_s, gib_status_text(a.out.status), 100.0 * a.worst);
+    troubles_print(&a.base.troubles, variation_trouble_names);
 }
 
 static void count(adversary_tally *t)
 {
-    t->met += troubles_met(&a.troubles);
+    t->met += troubles_met(&a.base.troubles);
     t->ended += a.status[0] == GIB_DONE;
 }
 

@@ -11,21 +11,23 @@ static const char *run(uint64_t seed, int mistake)
 {
     vibration_adversary_init(&a, seed, (vibration_mistake)mistake);
     vibration_adversary_run(&a);
-    return a.broken;
+    return a.base.broken;
 }
 
 static void describe(void)
 {
-    print_message("run %d, cycle %d of %d, %s, %.3g cycles of %.3g ms a turn, %d harmonics, fade %.3g turns, phase %d: %s; %.3g of %.3g um left, noise %.3g, worst %.3g\n", a.run + 1,
-                  a.broken_at, a.cycles, a.config.method ? "integrated" : "harmonic", a.turn_cycles, 1e3 * a.config.cycle_s, a.form,
-                  a.config.fade_s / a.config.cycle_s / a.turn_cycles, a.out.phase, gib_status_text(a.out.message), a.left[a.run], a.without[a.run], a.floor_um[a.run], a.worst);
-    troubles_print(&a.troubles, vibration_trouble_names);
+    print_message("run %d, cycle %d of %d, %s, %.3g cycles of %.3g ms a turn, %d harmonics, fade %.3g turns, phase %d: %s; %.3g of %.3g um "
+                  "left, noise %.3g, worst %.3g\n",
+                  a.base.run + 1, a.base.broken_at, a.cycles, a.config.method ? "integrated" : "harmonic", a.turn_cycles,
+                  1e3 * a.config.cycle_s, a.form, a.config.fade_s / a.config.cycle_s / a.turn_cycles, a.out.phase,
+                  gib_status_text(a.out.message), a.left[a.base.run], a.without[a.base.run], a.floor_um[a.base.run], a.worst);
+    troubles_print(&a.base.troubles, vibration_trouble_names);
 }
 
 static void count(adversary_tally *t)
 {
-    t->met += troubles_met(&a.troubles);
-    for (int run = 0; run <= a.run; run++) {
+    t->met += troubles_met(&a.base.troubles);
+    for (int run = 0; run <= a.base.run; run++) {
         int clean = vibration_adversary_clean(&a, run);
         t->ended += a.status[run] == GIB_BUSY;
         t->clean += clean;

@@ -8,7 +8,7 @@
 
 #include "tilt_laws.h"
 #include "tilt_matrices.h"
-#include "troubles.h"
+#include "adversary.h"
 
 typedef enum {
     TILT_LOAD_STUCK,
@@ -75,11 +75,10 @@ typedef enum {
 enum { TILT_MOST_TROUBLES = 3, TILT_MEMORY = 196608, TILT_LATEST = 128, TILT_MOST_PASSES = 6 };
 
 typedef struct {
+    adversary base;
     gib_tilt_config config;
     gib_tilt_table table;
-    troubles troubles;
     tilt_mistake mistake;
-    uint64_t random;
     tilt_axis axes[2];
     tilt_plane plane;
     double load_at_0, rise, knee, knee_mm; /* load of a depth: at none, a mm, and what it bends by */
@@ -88,7 +87,7 @@ typedef struct {
     int passes, pass_cycles, air, answers, after;
     double extent_mm, needed_mm;
     /* of a run */
-    int run, cycle, pass, n, ended, named, in_phase, corner, waited, slowed, tried, rested;
+    int pass, n, named, in_phase, corner, waited, slowed, tried, rested;
     double at[2], share, cut_m, drift, phase, stuck[3], late[TILT_LATEST], depth[3], fastest[2];
     int jammed, sign;
     uint32_t made; /* requests of the runs before */
@@ -101,8 +100,6 @@ typedef struct {
     gib_tilt_report report[2];
     gib_error_detail detail[2];
     double left_mm[2], before_mm;
-    const char *broken; /* first law broken, or NULL */
-    int broken_at;
 } tilt_adversary;
 
 /* Sets up machine, configuration and troubles from one seed. */
@@ -113,10 +110,7 @@ int tilt_adversary_clean(const tilt_adversary *a, int run);
 /* Angle of the surface about x (axis 0) and y (1), degrees, and to the path's plane (-1); of a line what is along it. */
 double tilt_adversary_truth(const tilt_adversary *a, int run, int axis);
 
-/* Between its parts: a trouble of a kind in this cycle, whether it begins in it, whether it ever was; what the kernel tells. */
-const trouble *tilt_adversary_now(const tilt_adversary *a, int kind);
-int tilt_adversary_begins(const tilt_adversary *a, int kind);
-int tilt_adversary_ever(const tilt_adversary *a, int kind);
+/* Between its parts: what the kernel tells. */
 void tilt_adversary_tell(tilt_adversary *a);
 
 #endif

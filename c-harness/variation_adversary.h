@@ -7,7 +7,7 @@
 #define VARIATION_ADVERSARY_H
 
 #include "spindle_run.h"
-#include "troubles.h"
+#include "adversary.h"
 
 typedef enum {
     VARIATION_OVERRIDE,   /* the mean speed goes up and down, within its bounds, in every cycle */
@@ -49,14 +49,13 @@ typedef enum {
 enum { VARIATION_MOST_TROUBLES = 4, VARIATION_MEMORY = 4096 };
 
 typedef struct {
+    adversary base;
     gib_speed_variation_config config;
-    troubles troubles;
     int cycles;
     variation_mistake mistake;
-    uint64_t random;
     spindle s;
     /* of a run */
-    int run, cycle, ended, named, steady;
+    int named, steady;
     gib_speed_variation_input in, last;
     gib_speed_variation_output out, before;
     double true_cutting_nm;
@@ -66,8 +65,6 @@ typedef struct {
     _Alignas(16) unsigned char memory[2][VARIATION_MEMORY];
     int32_t status[2];
     double worst; /* largest share of power or torque that was demanded, as the meter read it */
-    const char *broken;
-    int broken_at;
 } variation_adversary;
 
 void variation_adversary_init(variation_adversary *a, uint64_t seed, variation_mistake mistake);

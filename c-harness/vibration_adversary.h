@@ -13,7 +13,7 @@
 #define VIBRATION_ADVERSARY_H
 
 #include "gib.h"
-#include "troubles.h"
+#include "adversary.h"
 
 typedef enum {
     VIBRATION_SENSOR_STUCK, /* one of seat and bearing; so for all of a sensor */
@@ -71,19 +71,18 @@ typedef enum {
 enum { VIBRATION_MOST_TROUBLES = 3, VIBRATION_MEMORY = 8192, VIBRATION_FORM = 16 };
 
 typedef struct {
+    adversary base;
     gib_vibration_config config, given;
     gib_calibration_table table;
     int has_table, form;
-    troubles troubles;
     vibration_mistake mistake;
-    uint64_t random;
     double turn_cycles, revolutions, swing, swing_turns; /* the spindle: cycles of a revolution, what its speed swings by */
     double coefficient[VIBRATION_FORM][2], unbalance[2], second[2]; /* of the forms, in µm as the seat takes it */
     int second_multiple;
     double w[2], damping[2], takes[2], gain[2], lag_s[2], offset[2], drift[2], noise[2], grid, scale_grid, counts;
     int wrapped, steps;
     /* of a run */
-    int run, cycle, cycles, bad, good_cycles;
+    int cycles, bad, good_cycles;
     double angle, rate, told_angle, angle_added, part[2][2], seen[2], filtered[2], stuck[3], held[2], scale_mm;
     double truth, truths, errors, worst, peak;
     gib_vibration_input told, told_before;
@@ -91,8 +90,6 @@ typedef struct {
     _Alignas(16) unsigned char memory[2][VIBRATION_MEMORY];
     int32_t status[2];
     double left[2], without[2], floor_um[2]; /* of the last revolutions: error with and without, what noise explains, µm rms */
-    const char *broken; /* first law broken, or NULL */
-    int broken_at;
 } vibration_adversary;
 
 /* Sets up machine, configuration and troubles from one seed. */

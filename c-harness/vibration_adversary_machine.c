@@ -6,21 +6,6 @@
 
 static const double TWO_PI = 6.283185307179586;
 
-static double between(vibration_adversary *a, double low, double high)
-{
-    return random_between(&a->random, low, high);
-}
-
-static double over(vibration_adversary *a, double low, double high)
-{
-    return random_over(&a->random, low, high);
-}
-
-static int chance(vibration_adversary *a, double share)
-{
-    return random_chance(&a->random, share);
-}
-
 static double within(double value, double low, double high)
 {
     return fmin(fmax(value, low), high);
@@ -49,13 +34,13 @@ double vibration_adversary_swings(const vibration_adversary *a, int power, int l
 static void draw_table(vibration_adversary *a, double hz)
 {
     gib_calibration_table *t = &a->table;
-    a->has_table = chance(a, 0.7);
+    a->has_table = chance(&a->base, 0.7);
     t->struct_size = sizeof *t;
-    t->count = (uint32_t)between(a, 12.0, 33.0);
-    double from = hz * between(a, 0.3, 0.9), to = fmin(hz * a->form * over(a, 1.2, 30.0), 9e4);
+    t->count = (uint32_t)between(&a->base, 12.0, 33.0);
+    double from = hz * between(&a->base, 0.3, 0.9), to = fmin(hz * a->form * over(&a->base, 1.2, 30.0), 9e4);
     for (int n = 0; n < 2; n++) {
-        a->gain[n] = 1.0 + between(a, -0.01, 0.01) * (a->has_table ? 15.0 : 1.0);
-        a->lag_s[n] = a->has_table ? over(a, 0.003, 0.3) / (TWO_PI * hz * a->form) : 0.0;
+        a->gain[n] = 1.0 + between(&a->base, -0.01, 0.01) * (a->has_table ? 15.0 : 1.0);
+        a->lag_s[n] = a->has_table ? over(&a->base, 0.003, 0.3) / (TWO_PI * hz * a->form) : 0.0;
     }
     for (uint32_t i = 0; i < t->count; i++) {
         double f = from * pow(to / from, (double)i / (t->count - 1));
@@ -74,25 +59,26 @@ static void draw_machine(vibration_adversary *a)
     gib_vibration_config *g = &a->config;
     double rpm;
     do {
-        g->cycle_s = over(a, 5e-5, 0.02);
-        a->turn_cycles = over(a, 10.0, 500.0);
+        g->cycle_s = over(&a->base, 5e-5, 0.02);
+        a->turn_cycles = over(&a->base, 10.0, 500.0);
         rpm = 60.0 / (a->turn_cycles * g->cycle_s);
     } while (rpm < 8.0 || rpm > 30000.0);
     double hz = rpm / 60.0;
-    g->harmonics = chance(a, 0.3) ? 0 : 1 + (int)between(a, 0.0, 16.0);
+    g->harmonics = chance(&a->base, 0.3) ? 0 : 1 + (int)between(&a->base, 0.0, 16.0);
     a->form = (int)fmax(1.0, fmin(g->harmonics ? g->harmonics : 8, 0.33 * a->turn_cycles));
     for (int i = 0; i < 3; i++) {
-        int k = (int)between(a, 0.0, a->form);
-        a->coefficient[k][i & 1] = between(a, -1.0, 1.0) / ((k + 1.0) * (k + 1.0));
+        int k = (int)between(&a->base, 0.0, a->form);
+        a->coefficient[k][i & 1] = between(&a->base, -1.0, 1.0) / ((k + 1.0) * (k + 1.0));
     }
     for (int n = 0; n < 2; n++) {
-        a->w[n] = TWO_PI * hz * a->form * (chance(a, 0.8) ? over(a, 1.3, 5.0) : over(a, 0.4, 1.3));
-        a->damping[n] = over(a, 0.04, 0.5);
-        a->takes[n] = over(a, 0.1, 1.0) * (n ? 1.0 : -1.0);
-        a->unbalance[n] = between(a, -0.1, 0.1);
-        a->offset[n] = between(a, -0.05, 0.05);
+        a->w[n] = TWO_PI * hz * a->form * (chance(&a->base, 0.8) ? over(&a->base, 1.3, 5.0) : over(&a->base, 0.4, 1.3));
+        a->damping[n] = over(&a->base, 0.04, 0.5);
+        a->takes[n] = over(&a->base, 0.1, 1.0) * (n ? 1.0 : -1.0);
+        a->unbalance[n] = between(&a->base, -0.1, 0.1);
+        a->offset[n] = between(&a->base, -0.05, 0.05);
     }
-    double turning = TWO_PI * hz, size = over(a, 0.1, 500.0) / vibration_adversary_swings(a, 0, 1), most = 1e-6 * vibration_adversary_swings(a, 2, 1) * turning * turning;
+    double turning = TWO_PI * hz, size = over(&a->base, 0.1, 500.0) / vibration_adversary_swings(a, 0, 1),
+           most = 1e-6 * vibration_adversary_swings(a, 2, 1) * turning * turning;
     size = fmin(within(size, 0.01 / most, 1000.0 / most), 2000.0 / vibration_adversary_swings(a, 0, 1));
     for (int k = 0; k < VIBRATION_FORM; k++) {
         a->coefficient[k][0] *= size;
@@ -101,22 +87,22 @@ static void draw_machine(vibration_adversary *a)
     a->unbalance[0] *= size;
     a->unbalance[1] *= size;
     most *= size;
-    g->second_slide = chance(a, 0.25);
-    a->second_multiple = 1 + (int)between(a, 0.0, fmin(a->form, 3.0));
+    g->second_slide = chance(&a->base, 0.25);
+    a->second_multiple = 1 + (int)between(&a->base, 0.0, fmin(a->form, 3.0));
     for (int i = 0; i < 2 && g->second_slide; i++) {
-        a->second[i] = between(a, -1.0, 1.0) * vibration_adversary_swings(a, 0, 1);
+        a->second[i] = between(&a->base, -1.0, 1.0) * vibration_adversary_swings(a, 0, 1);
     }
     most += 1e-6 * hypot(a->second[0], a->second[1]) * pow(a->second_multiple * turning, 2.0);
-    g->displacement_max_um = within(vibration_adversary_swings(a, 0, 1) * over(a, 2.0, 30.0), 0.1, 1e4);
-    g->acceleration_range_m_s2 = within(most * over(a, 3.0, 50.0), 0.1, 1e4);
-    g->acceleration_max_m_s2 = chance(a, 0.5) ? 0.0 : g->acceleration_range_m_s2 * between(a, 0.8, 1.0);
-    a->grid = g->acceleration_range_m_s2 / (chance(a, 0.5) ? 32768.0 : 8388608.0);
+    g->displacement_max_um = within(vibration_adversary_swings(a, 0, 1) * over(&a->base, 2.0, 30.0), 0.1, 1e4);
+    g->acceleration_range_m_s2 = within(most * over(&a->base, 3.0, 50.0), 0.1, 1e4);
+    g->acceleration_max_m_s2 = chance(&a->base, 0.5) ? 0.0 : g->acceleration_range_m_s2 * between(&a->base, 0.8, 1.0);
+    a->grid = g->acceleration_range_m_s2 / (chance(&a->base, 0.5) ? 32768.0 : 8388608.0);
     for (int n = 0; n < 2; n++) {
-        a->noise[n] = fmax(most * over(a, 1e-5, 0.03), 0.3 * a->grid);
-        a->drift[n] = 1e-3 * most * between(a, -1.0, 1.0) / a->turn_cycles;
+        a->noise[n] = fmax(most * over(&a->base, 1e-5, 0.03), 0.3 * a->grid);
+        a->drift[n] = 1e-3 * most * between(&a->base, -1.0, 1.0) / a->turn_cycles;
         a->offset[n] *= g->acceleration_range_m_s2;
     }
-    a->scale_grid = over(a, 1e-6, 1e-3);
+    a->scale_grid = over(&a->base, 1e-6, 1e-3);
     draw_table(a, hz);
     double fastest = fmax(fmax(a->w[0], a->w[1]), 2.0 * turning * a->form);
     fastest = fmax(fastest, a->has_table ? 0.3 / fmin(a->lag_s[0], a->lag_s[1]) : 0.0);
@@ -130,18 +116,18 @@ static void draw(vibration_adversary *a)
     g->struct_size = sizeof *g;
     draw_machine(a);
     double turn_s = a->turn_cycles * g->cycle_s, rpm = 60.0 / turn_s;
-    g->method = chance(a, 0.25) ? GIB_VIBRATION_INTEGRATE : GIB_VIBRATION_HARMONIC;
-    g->main_harmonic = (int)between(a, 0.0, 3.0);
-    g->speed_min_rpm = within(rpm * over(a, 0.05, 0.6), 1.0, 1e4);
-    g->speed_max_rpm = within(rpm * over(a, 1.7, 4.0), g->speed_min_rpm, 15.0 / g->cycle_s);
-    g->frequency_min_hz = within(over(a, 0.05, 0.6) / turn_s, 0.1, 1000.0);
-    g->averaging_revolutions = chance(a, 0.3) ? 0.0 : over(a, 1.0, 60.0);
-    g->fade_s = within(turn_s * over(a, 0.05, 6.0), 0.001, 10.0);
-    g->speed_filter_s = within(turn_s * over(a, 0.01, 1.0), g->cycle_s, 1.0);
-    a->swing = chance(a, 0.7) ? 0.0 : between(a, 0.0, 0.1);
-    a->swing_turns = over(a, 15.0, 100.0);
-    a->counts = chance(a, 0.4) ? 0.0 : over(a, 2000.0, 1e6);
-    a->wrapped = (int)between(a, 0.0, 3.0);
+    g->method = chance(&a->base, 0.25) ? GIB_VIBRATION_INTEGRATE : GIB_VIBRATION_HARMONIC;
+    g->main_harmonic = (int)between(&a->base, 0.0, 3.0);
+    g->speed_min_rpm = within(rpm * over(&a->base, 0.05, 0.6), 1.0, 1e4);
+    g->speed_max_rpm = within(rpm * over(&a->base, 1.7, 4.0), g->speed_min_rpm, 15.0 / g->cycle_s);
+    g->frequency_min_hz = within(over(&a->base, 0.05, 0.6) / turn_s, 0.1, 1000.0);
+    g->averaging_revolutions = chance(&a->base, 0.3) ? 0.0 : over(&a->base, 1.0, 60.0);
+    g->fade_s = within(turn_s * over(&a->base, 0.05, 6.0), 0.001, 10.0);
+    g->speed_filter_s = within(turn_s * over(&a->base, 0.01, 1.0), g->cycle_s, 1.0);
+    a->swing = chance(&a->base, 0.7) ? 0.0 : between(&a->base, 0.0, 0.1);
+    a->swing_turns = over(&a->base, 15.0, 100.0);
+    a->counts = chance(&a->base, 0.4) ? 0.0 : over(&a->base, 2000.0, 1e6);
+    a->wrapped = (int)between(&a->base, 0.0, 3.0);
     a->revolutions = 40.0 + 2.0 * fmax(g->fade_s, 3.0 * g->speed_filter_s) / turn_s;
     a->cycles = (int)(a->revolutions * a->turn_cycles);
     /* What is integrated must not drift too far within a revolution, by noise or by its offset; that it may, is the method's own. */
@@ -156,9 +142,9 @@ static void draw(vibration_adversary *a)
 void vibration_adversary_init(vibration_adversary *a, uint64_t seed, vibration_mistake mistake)
 {
     memset(a, 0, sizeof *a);
-    a->random = seed;
+    a->base.random = seed;
     a->mistake = mistake;
     draw(a);
-    int count = chance(a, 0.3) ? 0 : (int)between(a, 1.0, VIBRATION_MOST_TROUBLES + 1.0);
-    troubles_draw(&a->troubles, &a->random, count, VIBRATION_TROUBLES, a->cycles, 0.1, 0.3);
+    int count = chance(&a->base, 0.3) ? 0 : (int)between(&a->base, 1.0, VIBRATION_MOST_TROUBLES + 1.0);
+    troubles_draw(&a->base.troubles, &a->base.random, count, VIBRATION_TROUBLES, a->cycles, 0.1, 0.3);
 }
