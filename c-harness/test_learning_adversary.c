@@ -36,7 +36,7 @@ static void count(adversary_tally *t)
     }
 }
 
-static const char RIGHT[] = "a command no worse than the target";
+static const char RIGHT[] = "what was learnt kept, no worse, and as good as it says";
 
 static const char *const LAWS[LEARNING_MISTAKES] = {
     [LEARNING_LEAPS] = "a correction within its speed",
@@ -55,7 +55,7 @@ int main(int argc, char **argv)
     const adversary_test test = {
         .known_seed = 20261200, .known_runs = FEWER(400), .fresh_runs = 20,
         .least_met = 0.5, .least_ended = 0.2, .least_clean = 1.0,
-        .right = RIGHT, .runs_a_wrong = 100, .held_from = 30, .held_to = 90, .most_refused = 4,
+        .right = RIGHT, .runs_a_wrong = 500, .held_from = 30, .held_to = 90, .most_refused = 4,
         .mistakes = LEARNING_MISTAKES, .mistaken_runs = FEWER(100), .least = 2, .laws = LAWS,
         .run = run, .count = count, .describe = describe,
     };

@@ -178,7 +178,7 @@ impl Learning {
             (self.force, self.steepest) = ([Cell::default(); ENTRIES], 0.0);
             self.best = [0.0; ENTRIES];
             self.lines = [Line::default(); GIB_LEARNING_HARMONICS];
-            self.seen = [0.0; ENTRIES];
+            (self.seen, self.bins) = ([0.0; ENTRIES], [Bin::default(); ENTRIES]);
             self.report.correction_um = 0.0;
         }
         self.plan = plan;

@@ -43,7 +43,9 @@ impl<const N: usize> Tables<'_, N> {
         };
         let mut any = false;
         extra[rows.start] = [0.0; N];
-        lag.get_mut(rows.clone()).into_iter().flatten().last().into_iter().for_each(|last| *last = [0.0; N]);
+        if let Some(last) = lag.get_mut(rows.end - 1) {
+            *last = [0.0; N];
+        }
         for i in rows.start..rows.end - 1 {
             extra[i + 1] = [0.0; N];
             let next = self.carried(i + 1);
