@@ -190,12 +190,15 @@ static void see_position(vibration_adversary *a, double plain)
     law(&a->base, fabs(o->blend_ratio - b->blend_ratio) <= fade * (1.0 + 1e-9) || o->status != GIB_BUSY,
         "a correction that comes and goes within its time");
     a->bad = o->reasons != 0 || o->status != GIB_BUSY || o->phase == GIB_VIBRATION_STOPPING ? a->bad + 1 : 0;
-    law(&a->base, a->bad <= 1.0 / fade + 2.0 || o->correction_um == 0.0, "the plain scale where something is wrong");
-    /* Where nothing has misled it, it moves as the machine does. The first revolutions tell of a stroke that still grows. */
+    /* What still goes after a start goes as it did before. */
+    double longest = fmax(a->config.fade_s, g->fade_s) / g->cycle_s;
+    law(&a->base, a->bad <= fmax(longest, 1.0) + 2.0 || o->correction_um == 0.0, "the plain scale where something is wrong");
+    /* Where nothing has misled it, it moves as the machine does, a harmonic that is renewed at a changing speed aside. The first
+     * revolutions tell of a stroke that still grows. */
     double turn = fmin(fabs(a->rate) + 0.5 / a->turn_cycles / a->turn_cycles, 0.5), faster = fmax(1.0, pow(fabs(a->rate) * a->turn_cycles, 2.0));
     double natural = TWO_PI * turn * vibration_adversary_swings(a, 1, 0) * faster + fade * most;
     law(&a->base,
-        misled(a) || g->method != GIB_VIBRATION_HARMONIC || fabs(o->correction_um - b->correction_um) <= 2.0 * natural + 4.0 * floor_um(a),
+        misled(a) || g->method != GIB_VIBRATION_HARMONIC || fabs(o->correction_um - b->correction_um) <= 3.0 * natural + 4.0 * floor_um(a),
         "a correction without a jump");
 }
 
