@@ -186,7 +186,10 @@ static void coverage(int plants, uint64_t seed, int slow)
         tilt_plant_init(&p, &c);
         int32_t status = taught == GIB_DONE ? tilt_measure(&k, &g, &table, passes, TILT_PASSES) : taught;
         if (status != GIB_DONE) {
-            printf("  machine %d of seed %llu: %s\n", i, (unsigned long long)seed, gib_status_text(status));
+            gib_error_detail detail;
+            gib_tilt_last_error(gib, &detail);
+            printf("  machine %d of seed %llu: %s (%s %g, allowed %g to %g)\n", i, (unsigned long long)seed, gib_status_text(status), detail.field,
+                   detail.value, detail.low, detail.high);
             failed++;
             continue;
         }

@@ -4,6 +4,7 @@
 //! about_x = atan gᵧ. Uncertainties are expanded (k = 2): scatter of the blocks, wear that could not be told apart, and
 //! the uncertainty of the table's rows, which scales the slope.
 
+use super::config::GIB_TILT_TEACH;
 use super::fit::{FEWEST, Fit};
 use super::plan::Plan;
 use super::table::two_point;
@@ -126,15 +127,18 @@ pub fn trusted(plan: &Plan, trace: &Trace, fit: &Fit) -> Result<(), Fault> {
     }
     at_most(GIB_ERR_TILT_RANGE, "load\0", outside, (used + outside) / 3)?;
     // A load that never changes is none, and one that rests at one value alone is stuck there, at its limit, or too coarse for this
-    // plane. One on a grid may rest at several for long; the waves of a current do not come out the same twice.
-    let resting = match trace.on_grid() {
+    // plane. One on a grid may rest at several for long, and in a cut of one depth at one; the waves of a current do not come out the
+    // same twice.
+    let waves = plan.squared > 0.0;
+    let one_depth = plan.purpose == GIB_TILT_TEACH && !waves;
+    let resting = match trace.on_grid() || one_depth {
         false => used.max(FEWEST as u32) / 20,
-        true if plan.squared > 0.0 => used.max(FEWEST as u32) / 3,
-        true => used,
+        true if waves => used.max(FEWEST as u32) / 3,
+        true => used.saturating_sub(2),
     };
     at_most(GIB_ERR_TILT_DATA, "load\0", trace.repeated(), resting)?;
     // One at its limit says the same wherever it is there; what is not is then thrown out, and the rest has no scatter.
-    at_most(GIB_ERR_TILT_DATA, "load\0", if fit.exact() { rejected } else { 0 }, 0)?;
+    at_most(GIB_ERR_TILT_DATA, "load\0", if fit.exact() && !one_depth { rejected } else { 0 }, 0)?;
     at_most(GIB_ERR_TILT_DATA, "position_mm\0", trace.jumped(), 0)?;
     if trace.blocks().len() < FEWEST {
         let (value, low) = (f64::from(used), FEWEST as f64);
