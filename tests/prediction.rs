@@ -209,6 +209,30 @@ fn lost_rows_cost_a_prediction_nothing() {
     }
 }
 
+/// Rows are servo cycles whatever clock stamped them: one that goes 4 ppm wrong, and scatters, costs the replayed position nothing.
+#[test]
+fn another_clock_costs_the_closed_loop_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let machine = linear_machine(folder.path(), "");
+    let file = |path: &Path| path.to_str().unwrap().to_owned();
+    let (own, other) = (path("own.csv"), path("other.csv"));
+    let simulated = ["simulate", "--moves", "test", "--seed", "5", "--torque-noise", "0.3", "--grid-um", "0.1"];
+    said(&gib(&[&simulated[..], &["--machine", &file(&machine), "--out", &file(&own)]].concat()));
+    let text = std::fs::read_to_string(&own).unwrap();
+    let stamped = |(row, line): (usize, &str)| match line.split_once(',') {
+        Some((time, rest)) if row > 0 => {
+            let scatter = ((row as f64 * 0.618_034).fract() - 0.5) * 3e-4;
+            format!("{:.7},{rest}\n", time.parse::<f64>().unwrap() * (1.0 + 4e-6) + scatter)
+        }
+        _ => format!("{line}\n"),
+    };
+    std::fs::write(&other, text.lines().enumerate().map(stamped).collect::<String>()).unwrap();
+    let key = "residual_position_rms_um";
+    let value = figures(&machine, &own)[key].as_f64().unwrap();
+    within(&figures(&machine, &other), key, 0.9 * value, 1.1 * value);
+}
+
 #[test]
 fn a_trajectory_is_followed_and_a_list_of_moves_run() {
     let folder = tempfile::tempdir().unwrap();

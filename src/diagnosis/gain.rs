@@ -56,7 +56,7 @@ fn errors(axis: &Axis, observed: &Observed, servo: &ByServo) -> Option<Errors> {
         observed.table_position.as_ref().zip(replayed.and_then(|r| r.table_position.as_ref())).map(|(t, r)| less(t, r)),
     ];
     let replay = prediction.manner().zip(channels[1].as_ref()).map(|(manner, error): (Manner, &Vec<f64>)| {
-        let rows = replayed::part(axis, observed).rows;
+        let rows = replayed::rows(axis, observed);
         Replay { axis: axis.clone(), manner, error: error[..rows].to_vec() }
     });
     Some(Errors { channels, replay })

@@ -18,20 +18,23 @@ use super::progress::{Stopped, Watch};
 use super::uncertainty::{self, SIMULATED, Sure, widening};
 use crate::analysis::statistics;
 use crate::machine::Axis;
-use crate::plant::closed_loop::Part;
+use crate::plant::closed_loop::{Part, rows_of_the_beginning};
 use crate::plant::linear::{decomposed, rms};
 use crate::plant::observed::Observed;
 use nalgebra::{DMatrix, DVector};
 
 /// Contiguous blocks by which the position's word is judged.
 const BLOCKS: usize = 24;
-/// Plant steps of a replay at most, of a rigid axis and of two masses, which take as long for a third of them: 40 s, and some ten
-/// seconds in which reversals at several speeds have been.
-const MOST_STEPS: [usize; 2] = [1_600_000, 500_000];
-/// What moved numbers change needs no finer plant steps than this many of the usual ones, of a rigid axis and of two masses.
-const COARSER: [f64; 2] = [8.0, 2.0];
+/// How much of a recording is replayed at most, s, and plant steps of that, of a rigid axis and of two masses, which take three times
+/// as long for one.
+const MOST_S: f64 = 40.0;
+const MOST_STEPS: [usize; 2] = [640_000, 250_000];
+/// What moved numbers change needs no finer plant steps than this many of the usual ones.
+const COARSER: f64 = 8.0;
+/// The beginning, of which nothing is said, is no larger part of what is replayed than one in so many.
+const MOST_OF_ROWS: usize = 4;
 /// Replays at most after those of the start and of the derivatives.
-const MOST_TRIALS: usize = 3;
+const MOST_TRIALS: usize = 5;
 /// Share of the error that the first trial, and a further one, must promise to take off.
 const WORTH: [f64; 2] = [0.005, 0.03];
 /// How far the phase of a ripple may be off, rad, and what is a small turn of it.
@@ -64,19 +67,21 @@ pub fn refined(bench: &Bench, held_out: &HeldOut, judged: &Judged, watch: &Watch
     if position.is_none_or(|gain| gain.after <= statistics::white_noise(&observed.position).unwrap_or(0.0)) {
         return Ok(None);
     }
-    // Of the first rows only, where all of them would take long.
-    let error = |position: &[f64]| -> Vec<f64> {
-        let rows = observed.position.iter().zip(position);
-        rows.map(|(measured, replayed)| finite(measured - replayed)).collect()
-    };
     let machine = |numbers: &Numbers| numbers.machine(axis, bench, fit);
     let Some(named) = machine(&Numbers::of(fit)) else { return Ok(None) };
-    let rows = part(&named, observed).rows.min(known.error.len());
-    let coarse = Part { rows, coarser: COARSER[masses(&named) - 1] };
+    let rows = rows(&named, observed).min(known.error.len());
+    // Nobody knows how the table lay in its clearance at first, nor what friction held.
+    let begun = axis.servo.map_or(0, |servo| rows_of_the_beginning(&servo, observed)).min(rows / MOST_OF_ROWS);
+    let error = |position: &[f64]| -> Vec<f64> {
+        let rows = observed.position.iter().zip(position).skip(begun);
+        rows.map(|(measured, replayed)| finite(measured - replayed)).collect()
+    };
+    let coarse = Part { rows, coarser: COARSER };
     let sure = uncertainty::of_unknowns(bench, fit);
     let stopped = stopped(fit, &sure);
     // The phases of ripples are the recording's own, and the torque's noise has turned them: they are open beside the unknowns.
-    let Some(open) = Open::new(&without(&sure.covariance, &stopped), manner.ripples()) else { return Ok(None) };
+    let small = small_steps(fit, &sure);
+    let Some(open) = Open::new(&without(&sure.covariance, &stopped), &small, manner.ripples()) else { return Ok(None) };
     let replayed = |axis: &Axis, turned: &[f64]| manner.replayed(axis, (observed, servo), coarse, turned).ok()?;
     let replay = |z: &DVector<f64>| {
         let (by, turned) = open.unknowns_and_turns(z);
@@ -90,7 +95,7 @@ pub fn refined(bench: &Bench, held_out: &HeldOut, judged: &Judged, watch: &Watch
         match of {
             Move::Known => Some((0.0, replayed(&known.axis, &[])?)),
             Move::None => side(0, 0.0),
-            Move::Of(of) => side(of, open.small(of)).or_else(|| side(of, -open.small(of))),
+            Move::Of(of) => side(of, open.small[of]).or_else(|| side(of, -open.small[of])),
         }
     })?;
     let Some(sides) = sides.into_iter().collect::<Option<Vec<_>>>() else { return Ok(None) };
@@ -100,7 +105,7 @@ pub fn refined(bench: &Bench, held_out: &HeldOut, judged: &Judged, watch: &Watch
     let start: Vec<f64> = finer.zip(middle).map(|(finer, middle)| middle + finer).collect();
     let mut least = error(&start);
     let difference = |(size, side): &(f64, Vec<f64>)| -> Vec<f64> {
-        side.iter().zip(middle).map(|(side, middle)| finite((side - middle) / size)).collect()
+        side.iter().zip(middle).skip(begun).map(|(side, middle)| finite((side - middle) / size)).collect()
     };
     let Some(says) = Says::of(&sides.iter().map(difference).collect::<Vec<_>>()) else { return Ok(None) };
 
@@ -130,15 +135,11 @@ pub fn refined(bench: &Bench, held_out: &HeldOut, judged: &Judged, watch: &Watch
     }))
 }
 
-/// How much of a recording is replayed once more: all, or the first rows where that would take long.
+/// How many rows of a recording are replayed once more: all, or the first where that would take long.
 #[must_use]
-pub fn part(axis: &Axis, observed: &Observed) -> Part {
-    Part::of_steps(axis, observed, MOST_STEPS[masses(axis) - 1])
-}
-
-/// How many masses an axis is.
-fn masses(axis: &Axis) -> usize {
-    if matches!(axis.two_masses(), Ok(Some(_))) { 2 } else { 1 }
+pub fn rows(axis: &Axis, observed: &Observed) -> usize {
+    let masses = if matches!(axis.two_masses(), Ok(Some(_))) { 2 } else { 1 };
+    Part::of_steps(axis, observed, MOST_STEPS[masses - 1], COARSER).rows.min((MOST_S / observed.period_s) as usize)
 }
 
 /// What is replayed: the machine that was before, what is named, and with one of its unknowns moved.
@@ -198,11 +199,18 @@ fn stopped(fit: &Fit, sure: &Sure) -> Vec<usize> {
     let first = sure.covariance.nrows() - sure.shapes.len();
     let stops = |(s, &(part, index)): (usize, &(usize, usize))| {
         let (scale, at) = (fit.parts[part].law.scales[index], fit.parts[part].shape[index]);
-        let half = 0.5 * sure.covariance[(first + s, first + s)].sqrt();
+        let half = (0.5 * sure.covariance[(first + s, first + s)].sqrt()).min(scale.small());
         let short = |by: f64| scale.distance(at, scale.moved(at, by)).abs() < 0.9 * by.abs();
         (short(half) || short(-half)).then_some(first + s)
     };
     sure.shapes.iter().enumerate().filter_map(stops).collect()
+}
+
+/// How far each unknown goes in a step that is small, where it has bounds.
+fn small_steps(fit: &Fit, sure: &Sure) -> Vec<f64> {
+    let coefficients = vec![f64::INFINITY; sure.covariance.nrows() - sure.shapes.len()];
+    let of_shapes = sure.shapes.iter().map(|&(part, index)| fit.parts[part].law.scales[index].small());
+    coefficients.into_iter().chain(of_shapes).collect()
 }
 
 /// A covariance where some unknowns are known.
@@ -224,25 +232,28 @@ struct Open {
     /// L, lower triangular.
     root: DMatrix<f64>,
     unknowns: usize,
+    /// Of each the step over which the loop is straight enough: a deviation, or what is small for an unknown that goes with it, and
+    /// of a phase, of which less is known, a part of one.
+    small: Vec<f64>,
 }
 
 impl Open {
-    fn new(covariance: &DMatrix<f64>, ripples: usize) -> Option<Self> {
+    fn new(covariance: &DMatrix<f64>, small: &[f64], ripples: usize) -> Option<Self> {
         let (unknowns, own) = (covariance.nrows(), covariance.clone().cholesky()?.l());
         let of = |i: usize, j: usize| match (i < unknowns, j < unknowns) {
             (true, true) => own[(i, j)],
             _ => f64::from(u8::from(i == j)) * OPEN_PHASE,
         };
-        Some(Self { root: DMatrix::from_fn(unknowns + ripples, unknowns + ripples, of), unknowns })
+        let root = DMatrix::from_fn(unknowns + ripples, unknowns + ripples, of);
+        let step = |of: usize| match of < unknowns {
+            true => small.iter().zip(root.column(of).iter()).map(|(most, by)| most / by.abs()).fold(1.0, f64::min),
+            false => SMALL_TURN / OPEN_PHASE,
+        };
+        Some(Self { small: (0..root.nrows()).map(step).collect(), root, unknowns })
     }
 
     fn count(&self) -> usize {
         self.root.nrows()
-    }
-
-    /// A step over which the loop is straight enough: a deviation, and of a phase, of which less is known, a part of one.
-    fn small(&self, of: usize) -> f64 {
-        if of < self.unknowns { 1.0 } else { SMALL_TURN / OPEN_PHASE }
     }
 
     fn unknowns_and_turns(&self, z: &DVector<f64>) -> (DVector<f64>, Vec<f64>) {

@@ -5,7 +5,6 @@
 //! recording needs it as much as the command. Noise must not be taken for it: only rows that stand out of it count, and only
 //! where the law holds in the others, so that d is white there.
 
-use super::closed_loop::command_of_cycles;
 use super::linear::rms;
 use super::observed::Observed;
 use super::servo::{CommandSpeed, ServoLoop};
@@ -234,7 +233,7 @@ impl<'o> ByLaw<'o> {
     fn own_torque(&self) -> impl Iterator<Item = f64> {
         let (servo, observed) = (*self.servo, self.observed);
         let scale = self.axis.drive.motor_per_load();
-        let command = command_of_cycles(&observed.time_s, self.command, servo.period_s, self.command.len());
+        let command = self.command.iter().copied();
         let (rest, velocity) = (rest_of_a_cycle(&servo), observed.motion.velocity(0));
         let remembered = remembered(&servo);
         let mut torque = observed.torque[0];

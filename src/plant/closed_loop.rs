@@ -9,9 +9,9 @@ use super::noise::Noise;
 use super::observed::Observed;
 use super::physics::{Physics, Ripple};
 use super::predict::{TorquePrediction, predict_torque};
-use super::servo::CommandSpeed;
+use super::servo::{CommandSpeed, by_clock};
 use super::simulate::{Rows, Setup, Start, simulate_cycles, steps_per_cycle};
-use crate::machine::Axis;
+use crate::machine::{Axis, Servo};
 use std::iter::Peekable;
 use std::ops::Range;
 
@@ -174,13 +174,15 @@ impl Part {
         Self { rows: observed.time_s.len(), coarser: 1.0 }
     }
 
-    /// As many rows as a number of plant steps suffices for.
+    /// As many rows as a number of plant steps suffices for that are so many times longer than usual.
     #[must_use]
-    pub fn of_steps(axis: &Axis, observed: &Observed, most: usize) -> Self {
-        let whole = Self::whole(observed);
-        let step_s = Physics::of(axis).ok().zip(axis.servo).and_then(|(physics, servo)| {
-            Some(servo.period_s / steps_per_cycle(&physics, &servo, &Setup::default()).ok()? as f64)
-        });
+    pub fn of_steps(axis: &Axis, observed: &Observed, most: usize, coarser: f64) -> Self {
+        let whole = Self { coarser, ..Self::whole(observed) };
+        let setup = Setup { coarser, ..Setup::default() };
+        let step_s = Physics::of(axis)
+            .ok()
+            .zip(axis.servo)
+            .and_then(|(physics, servo)| Some(servo.period_s / steps_per_cycle(&physics, &servo, &setup).ok()? as f64));
         let rows = step_s.map_or(0.0, |step_s| most as f64 * step_s / observed.period_s);
         Self { rows: whole.rows.min(rows as usize), ..whole }
     }
@@ -206,8 +208,7 @@ impl Begun {
         servo: &ByServo,
     ) -> Result<Option<Self>, String> {
         let (Some(held), Some(law)) = (servo.held_at_start, &axis.servo) else { return Ok(None) };
-        let times = law.position_gain_1_s.recip() + law.velocity_integral_time_s.unwrap_or(0.0);
-        let rows = rows_in_motion(observed, FORGOTTEN * times);
+        let rows = rows_of_the_beginning(law, observed);
         let part = Part { rows, ..Part::whole(observed) };
         let rest: Vec<Range<usize>> =
             rest.iter().map(|range| range.start..range.end.min(rows)).filter(|range| !range.is_empty()).collect();
@@ -223,8 +224,11 @@ impl Begun {
     }
 }
 
-/// Rows until the axis has moved for so many seconds; all, if it never has.
-fn rows_in_motion(observed: &Observed, seconds: f64) -> usize {
+/// Rows until nothing is left of how a servo and what is behind it began; all, if the axis never moves for as long.
+#[must_use]
+pub fn rows_of_the_beginning(servo: &Servo, observed: &Observed) -> usize {
+    let times = servo.position_gain_1_s.recip() + servo.velocity_integral_time_s.unwrap_or(0.0);
+    let seconds = FORGOTTEN * times;
     let slow = observed.motion.standing_speed();
     let moving = observed.motion.velocities().enumerate().filter(|(_, v)| v.abs() > slow);
     let mut moving = moving.skip((seconds / observed.period_s).ceil() as usize);
@@ -295,7 +299,9 @@ fn replay(
     command_speed: CommandSpeed,
     part: Part,
 ) -> Result<Option<(ClosedLoop, Vec<f64>)>, String> {
-    let (Some(servo), Some(command)) = (&axis.servo, &observed.command) else { return Ok(None) };
+    let (Some(servo), Some(command)) = (axis.servo, &observed.command) else { return Ok(None) };
+    let servo = by_clock(servo, observed.period_s);
+    let axis = &Axis { servo: Some(servo), ..axis.clone() };
     let time = &observed.time_s[..part.rows];
     let (Some(&begin), Some(&end)) = (time.first(), time.last()) else { return Ok(None) };
     let cycles = ((end - begin) / servo.period_s).round() as usize + 1;
@@ -318,7 +324,7 @@ fn replay(
     // The rows of a recording made once a servo cycle are the cycles themselves.
     let place = |row: usize| {
         let exact = (time[row] - begin) / servo.period_s;
-        if (exact - exact.round()).abs() < 0.02 { exact.round() } else { exact }
+        if (exact - exact.round()).abs() <= ROUNDED { exact.round() } else { exact }
     };
     let with_table = observed.table_position.is_some();
     let mut rows = AtRows {
@@ -401,6 +407,9 @@ fn rows_at_rest(observed: &Observed) -> Vec<Range<usize>> {
     rest
 }
 
+/// Share of a cycle that is none: times are written rounded.
+const ROUNDED: f64 = 1e-3;
+
 /// The command at the start of each servo cycle: interpolated between rows, held over rows without one.
 pub fn command_of_cycles(time_s: &[f64], command: &[f64], period: f64, cycles: usize) -> impl Iterator<Item = f64> {
     let known = time_s.iter().zip(command).filter(|(_, x)| x.is_finite());
@@ -409,12 +418,11 @@ pub fn command_of_cycles(time_s: &[f64], command: &[f64], period: f64, cycles: u
     let (mut now, mut next) = (first, rows.next());
     (0..cycles).map(move |cycle| {
         let t = cycle as f64 * period;
-        while let Some(row) = next.filter(|row| row.0 <= t + 1e-3 * period) {
+        while let Some(row) = next.filter(|row| row.0 <= t + ROUNDED * period) {
             (now, next) = (Some(row), rows.next());
         }
         let (Some((_, x_first)), Some((t0, x0))) = (first, now) else { return 0.0 };
-        // Times are written rounded: a thousandth of a cycle is none.
-        if (t - t0).abs() <= 1e-3 * period {
+        if (t - t0).abs() <= ROUNDED * period {
             return x0;
         }
         match next {

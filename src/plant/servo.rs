@@ -55,6 +55,18 @@ impl CommandSpeed {
     }
 }
 
+/// By how much two clocks of quartz differ at most.
+const CLOCKS: f64 = 1e-4;
+
+/// A servo by the clock that stamped a recording: where rows are a whole number of cycles apart as far as two clocks agree, they are
+/// cycles, and the stamps say how long one takes.
+#[must_use]
+pub fn by_clock(servo: Servo, row_s: f64) -> Servo {
+    let cycles = row_s / servo.period_s;
+    let same = cycles >= 0.5 && (cycles / cycles.round() - 1.0).abs() < CLOCKS;
+    if same { Servo { period_s: row_s / cycles.round(), ..servo } } else { servo }
+}
+
 /// A servo and what it remembers between cycles. Positions in the motor's coordinate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ServoLoop {

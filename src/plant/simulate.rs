@@ -48,7 +48,7 @@ pub struct Start {
 pub struct Setup {
     /// Longest plant step, s; a servo cycle is divided into whole steps, and a stiff drive makes them finer.
     pub step_s: f64,
-    /// How many times longer the steps are than either asks for.
+    /// How many times longer the steps are than either asks for; of a spring's no more than twice.
     pub coarser: f64,
     /// Sensors.
     pub sensors: Sensors,
@@ -185,6 +185,9 @@ pub fn simulate_cycles(
     Ok(())
 }
 
+/// How many times longer than usual the steps may be in which a spring swings.
+const COARSEST_SWING: f64 = 2.0;
+
 /// Whole plant steps in a servo cycle.
 ///
 /// # Errors
@@ -197,7 +200,8 @@ pub(super) fn steps_per_cycle(physics: &Physics, servo: &Servo, setup: &Setup) -
     let spring = physics
         .two_masses
         .map_or(f64::INFINITY, |masses| longest_step_s(&masses, masses.motor_inertia.min(masses.table_inertia)));
-    let steps = (servo.period_s / (coarser * step_s.min(spring)) - 1e-9).ceil().max(1.0);
+    let step_s = (coarser * step_s).min(coarser.min(COARSEST_SWING) * spring);
+    let steps = (servo.period_s / step_s - 1e-9).ceil().max(1.0);
     if steps > 1e6 {
         return Err("the drive is so stiff against its inertia that a cycle would take over a million steps".into());
     }

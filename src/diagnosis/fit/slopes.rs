@@ -153,6 +153,11 @@ impl Scale {
         }
     }
 
+    /// A step over which what depends on the value goes straight enough.
+    pub(in crate::diagnosis) fn small(self) -> f64 {
+        0.1 * self.farthest()
+    }
+
     /// How far apart the bounds are, in the units of the scale, where a value has come within a step of one; of what is large or
     /// small without bounds that mean anything nothing can be said.
     pub(in crate::diagnosis) fn stopped_between(self, value: f64) -> Option<f64> {
