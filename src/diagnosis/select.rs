@@ -14,6 +14,7 @@ use super::fit::{Bench, Fit, Part, figure};
 use super::form;
 use super::formulation;
 use super::grids;
+use super::judge::{Excess, LITTLE_LEFT};
 use super::many::add;
 use super::progress::{Stopped, Watch};
 use super::uncertainty;
@@ -50,6 +51,9 @@ const MOST_IN_A_BLOCK: f64 = 0.125;
 /// Least share of the variance that causes explain where a cause acts: a thirtieth in amplitude. No law holds more exactly on a
 /// machine.
 const LEAST_SHARE: f64 = 0.001;
+
+/// What is said while sets are refined.
+const FITTING: &str = "fitting causes";
 
 /// Beats in a recording below which two vibrations are one that comes and goes.
 const BEATS: f64 = 4.0;
@@ -149,8 +153,7 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
         let share = |steps: usize| 0.8 - 0.65 * 0.4f64.powi(steps as i32);
         let mut grown = grow(search, &beam, (share(depth), share(depth + 1)))?;
         let Some(first) = grown.first() else { break };
-        let last_gain = best.last().map_or(f64::INFINITY, |f| price(f) - price(first));
-        if last_gain < 0.5 * LEAST_GAIN {
+        if best.last().is_some_and(|fit| !is_more(price(fit), first)) {
             break;
         }
         let of_fewer = best.last().map_or(f64::INFINITY, price);
@@ -189,6 +192,11 @@ fn grown_on(search: &Search, found: Selection) -> Result<Selection, Stopped> {
     let fit = shrink(search.bench, fit, search.watch)?;
     // Another formulation, as uncertain as before, is compared beside the same causes.
     Ok(if price(&fit) < price(&found.fit) { Selection { fit, alike: Vec::new(), ..found } } else { found })
+}
+
+/// Whether a set is worth going on from where another price was reached.
+fn is_more(before: f64, fit: &Fit) -> bool {
+    price(fit) <= before - 0.5 * LEAST_GAIN
 }
 
 /// What a set of causes costs: its figure, and its numbers.
@@ -234,20 +242,50 @@ impl Child<'_> {
 /// The sets with each of the most promising causes added, refined jointly: those that are worth it, best first.
 fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit>, Stopped> {
     let Search { bench, laws, watch, .. } = search;
-    let mut open: Vec<(&Fit, &'static Law)> =
-        beam.iter().flat_map(|set| laws.iter().filter(|law| may_join(set, law)).map(move |law| (set, *law))).collect();
+    let open = beam.iter().flat_map(|set| laws.iter().filter(|law| may_join(set, law)).map(move |law| (set, *law)));
+    // Simulations take longest. Beside other causes they are asked where no law that is worked out row by row is to be carried on
+    // and leaves little: beside one that is they are asked next, which shows what only imitates them.
+    let (mut first, last): (Vec<_>, Vec<_>) =
+        open.partition(|(set, law): &(&Fit, &Law)| !law.manner.simulated || set.parts.is_empty());
     // What takes longest is begun first, lest a core have nothing left to do beside it.
-    open.sort_by_key(|(_, law)| !law.manner.approached);
+    first.sort_by_key(|(_, law)| !law.manner.approached);
+    let half = if last.is_empty() { to } else { 0.5 * (from + to) };
+    let mut grown = with_one_more(search, &first, &[], (from, half))?;
+    let so_far = beam.iter().map(price).fold(f64::INFINITY, f64::min);
+    let suffices = |fit: &Fit| is_more(so_far, fit) && Excess::of(bench, fit, fit).largest() < LITTLE_LEFT;
+    if !last.is_empty() && !grown.first().is_some_and(suffices) {
+        let more = with_one_more(search, &last, &grown, (half, to))?;
+        grown.extend(more);
+        sort_by_price(&mut grown);
+    }
+    // Of what form a law is matters of the sets that are carried on.
+    let carried_on = grown.len().min(BEAM);
+    let formed = watch.each(&grown[..carried_on], (to, to), FITTING, |fit| of_form(bench, fit))?;
+    grown.splice(..carried_on, formed);
+    sort_by_price(&mut grown);
+    Ok(grown)
+}
+
+/// The sets with each of these laws added that may come among the best beside others: those that are worth it, best first.
+fn with_one_more(
+    search: &Search,
+    open: &[(&Fit, &'static Law)],
+    others: &[Fit],
+    (from, to): (f64, f64),
+) -> Result<Vec<Fit>, Stopped> {
+    let Search { bench, watch, .. } = search;
     let half = 0.5 * (from + to);
     let look = |&(set, law): &(_, _)| at_best_starts(search, set, law);
     let mut children: Vec<Child> =
-        watch.each(&open, (from, half), "looking for causes", look)?.into_iter().flatten().collect();
+        watch.each(open, (from, half), "looking for causes", look)?.into_iter().flatten().collect();
     children.sort_by(|a, b| a.price.total_cmp(&b.price));
     // Two sets may grow into the same one, which is refined once, from where it costs less.
     let mut seen = HashSet::new();
     children.retain(|child| seen.insert((child.causes(), few_periods(&child.part))));
     // What cannot come among those that are carried on need not be refined.
-    let carried_on = children.get(BEAM - 1).map_or(f64::INFINITY, |child| child.price);
+    let mut prices: Vec<f64> = children.iter().map(|child| child.price).chain(others.iter().map(price)).collect();
+    prices.sort_by(f64::total_cmp);
+    let carried_on = prices.get(BEAM - 1).copied().unwrap_or(f64::INFINITY);
     let mut tried: HashMap<Vec<Cause>, usize> = HashMap::new();
     children.retain(|child| {
         let count = tried.entry(causes(child.set)).or_default();
@@ -255,12 +293,11 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
         *count <= TRIED && child.within_reach() < carried_on
     });
     children.sort_by_key(|child| !child.part.law.manner.simulated);
-    let stage = "fitting causes";
-    let fits = watch.each(&children, (half, to), stage, |Child { set, part, .. }| refined(bench, set, part.clone()))?;
+    let fits = watch.each(&children, (half, to), FITTING, |Child { set, part, .. }| refined(bench, set, part.clone()))?;
     let (within, strayed): (Vec<_>, Vec<_>) =
         fits.into_iter().zip(&children).partition(|(fit, _)| is_physical(bench, fit));
-    let best = within.iter().map(|(fit, _)| fit).min_by(|a, b| price(a).total_cmp(&price(b)));
-    let right = watch.each(&strayed, (to, to), stage, |(fit, child)| {
+    let best = within.iter().map(|(fit, _)| fit).chain(others).min_by(|a, b| price(a).total_cmp(&price(b)));
+    let right = watch.each(&strayed, (to, to), FITTING, |(fit, child)| {
         let right = if astray::matters(fit, best) { astray::put_right(bench, child.set, fit) } else { None };
         right.filter(|fit| is_physical(bench, fit))
     })?;
@@ -269,11 +306,6 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
         price(fit) < price(child.set) - 0.5 * LEAST_GAIN && once_only(bench, fit).is_none()
     };
     let mut grown: Vec<Fit> = within.into_iter().chain(right).filter(worth).map(|(fit, _)| fit).collect();
-    sort_by_price(&mut grown);
-    // Of what form a law is matters of the sets that are carried on.
-    let carried_on = grown.len().min(BEAM);
-    let formed = watch.each(&grown[..carried_on], (to, to), stage, |fit| of_form(bench, fit))?;
-    grown.splice(..carried_on, formed);
     sort_by_price(&mut grown);
     Ok(grown)
 }
