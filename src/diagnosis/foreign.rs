@@ -7,7 +7,8 @@ mod laws;
 use super::fit::{Bench, Fit, Part};
 use super::judge::{Excess, LITTLE_LEFT, MOST_OF_A_CURVE};
 use super::progress::{Stopped, Watch};
-use super::select::{LEAST_GAIN, NUMBER_PRICE, idle_left_out, price};
+use super::select::{LEAST_GAIN, NUMBER_PRICE, price};
+use super::shrink::idle_left_out;
 use laws::{Foreign, LAWS, PLACES};
 
 /// Share of what causes explain that a law without a name must stand for, for none of them to be named.

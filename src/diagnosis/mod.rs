@@ -36,6 +36,7 @@ mod rows;
 pub mod sampling;
 pub mod select;
 pub mod show;
+mod shrink;
 pub mod uncertainty;
 pub mod verdict;
 

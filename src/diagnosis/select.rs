@@ -2,22 +2,19 @@
 //! what is not needed.
 //!
 //! Sets are compared by Σ ln(mean square) over the channels. Residuals are strongly autocorrelated, so a cause joins only
-//! when its gain is a fair share of what is left, and is borne out on held-out contiguous blocks: the coefficients are
-//! fitted without a block and judged on it.
+//! when its gain is a fair share of what is left, and stays where it is needed (`shrink`).
 
 use super::approach::Approach;
 use super::astray;
-use super::blocks;
 use super::causes::Law;
 use super::causes::periods::{FEW, is_all_the_time, is_in_each_period};
 use super::fit::{Bench, Fit, Part, figure};
 use super::form;
 use super::formulation;
-use super::grids;
 use super::judge::{Excess, LITTLE_LEFT};
 use super::many::add;
 use super::progress::{Stopped, Watch};
-use super::uncertainty;
+use super::shrink::{idle_left_out, shrink};
 use crate::machine::Cause;
 use std::collections::{HashMap, HashSet};
 
@@ -40,17 +37,6 @@ const LEAST_AT_START: f64 = SHOWN_AT_START * LEAST_GAIN;
 const LEAST_OF_FEW: f64 = 0.4;
 /// What a further fitted number must gain where sets of causes compete.
 pub const NUMBER_PRICE: f64 = 0.003;
-
-/// Least mean over scatter of the blocks' gains, times √blocks. What only one block shows gives exactly 1 and may count: the
-/// others predicted it, or the gain held out would not be there.
-const LEAST_T: f64 = 0.9;
-
-/// Share of what a cause explains that one block may hold.
-const MOST_IN_A_BLOCK: f64 = 0.125;
-
-/// Least share of the variance that causes explain where a cause acts: a thirtieth in amplitude. No law holds more exactly on a
-/// machine.
-const LEAST_SHARE: f64 = 0.001;
 
 /// What is said while sets are refined.
 const FITTING: &str = "fitting causes";
@@ -293,7 +279,8 @@ fn with_one_more(
         *count <= TRIED && child.within_reach() < carried_on
     });
     children.sort_by_key(|child| !child.part.law.manner.simulated);
-    let fits = watch.each(&children, (half, to), FITTING, |Child { set, part, .. }| refined(bench, set, part.clone()))?;
+    let fits =
+        watch.each(&children, (half, to), FITTING, |Child { set, part, .. }| refined(bench, set, part.clone()))?;
     let (within, strayed): (Vec<_>, Vec<_>) =
         fits.into_iter().zip(&children).partition(|(fit, _)| is_physical(bench, fit));
     let best = within.iter().map(|(fit, _)| fit).chain(others).min_by(|a, b| price(a).total_cmp(&price(b)));
@@ -386,87 +373,6 @@ pub fn is_within_bounds(bench: &Bench, fit: &Fit, part: usize) -> bool {
     (law.effect)(bench.frame, shape, &fit.coefficients[part]).is_some()
 }
 
-/// Drops causes that the others do without as they are, weakest first: refined, the others would do without them all the more.
-///
-/// # Errors
-/// [`Stopped`] when the watch's caller said so.
-pub fn idle_left_out(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
-    loop {
-        let each: Vec<usize> = (0..fit.parts.len()).collect();
-        let without = watch.each(&each, (0.8, 0.8), "leaving out what is not needed", |&i| {
-            let mut parts = fit.parts.clone();
-            parts.remove(i);
-            bench.fit(parts)
-        })?;
-        let weakest = without.into_iter().min_by(|a, b| price(a).total_cmp(&price(b)));
-        match weakest.filter(|less| price(less) - price(&fit) < LEAST_GAIN) {
-            Some(less) => fit = less,
-            None => return Ok(fit),
-        }
-    }
-}
-
-/// Drops causes that the others can do without, and those that held-out blocks do not bear out.
-///
-/// # Errors
-/// [`Stopped`] when the watch's caller said so.
-pub fn shrink(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
-    fit = bench.refine_across(fit, 8, watch)?;
-    let all = 0..fit.parts.len();
-    fit = form::settled(bench, fit, all, 8);
-    while !fit.parts.is_empty() {
-        let each: Vec<usize> = (0..fit.parts.len()).collect();
-        let mut without = watch.each(&each, (0.8, 0.9), "leaving out what is not needed", |&i| {
-            let mut parts = fit.parts.clone();
-            parts.remove(i);
-            bench.refine(bench.fit(parts), 0, 4)
-        })?;
-        let Some(&weakest) = each.iter().min_by(|a, b| price(&without[**a]).total_cmp(&price(&without[**b]))) else {
-            break;
-        };
-        let needed = price(&without[weakest]) - price(&fit) >= LEAST_GAIN && borne_out(bench, &without[weakest], &fit);
-        let dropped = if needed {
-            slight(bench, &without, &fit)
-                .or_else(|| doubtful(bench, &without, &fit))
-                .or_else(|| once_only(bench, &fit))
-                .or_else(|| grids::imitated(bench, &without, &fit))
-        } else {
-            Some(weakest)
-        };
-        let Some(dropped) = dropped else { break };
-        fit = without.swap_remove(dropped);
-    }
-    Ok(fit)
-}
-
-/// The part that is small, where it acts, against what is explained there and believed: it may well leave by being not quite
-/// the law that the others follow. Where it acts, since a law errs where it acts itself; a friction that builds up in some µm
-/// after each reversal is gone elsewhere, and large where it is.
-fn slight(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
-    // Mean square of what the part explains over that by which all that is explained may be off, each row by the square of the part.
-    let share = |less: &Fit| {
-        let rows = less.residual.iter().zip(&fit.residual).zip(bench.measured.iter().zip(&bench.doubt));
-        let (own, off) = rows.fold((0.0, 0.0), |(own, off), ((less, left), (measured, doubt))| {
-            let square = (less - left).powi(2);
-            let off_here = LEAST_SHARE * (measured - left).powi(2) + doubt * doubt;
-            (own + square * square, off + square * off_here)
-        });
-        if off > 0.0 { own / off } else { f64::INFINITY }
-    };
-    let shares: Vec<f64> = without.iter().map(share).collect();
-    let weakest = (0..shares.len()).min_by(|&a, &b| shares[a].total_cmp(&shares[b]))?;
-    (shares[weakest] < 1.0).then_some(weakest)
-}
-
-/// The part of which least is known that it is there at all. What halves the rest of a channel is there, however little is
-/// known of its size: a law that is not quite the machine's leaves much, by which its size is uncertain.
-fn doubtful(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
-    let strengths = uncertainty::strengths(bench, fit);
-    let open = (0..strengths.len()).filter(|&i| !fit.halves(&without[i]));
-    let weakest = open.min_by(|&a, &b| strengths[a].total_cmp(&strengths[b]))?;
-    (strengths[weakest] < LEAST_STRENGTH).then_some(weakest)
-}
-
 /// Whether a part is a ripple of few periods along the stroke.
 fn few_periods(part: &Part) -> bool {
     let along_stroke = [Cause::Cogging, Cause::ScrewPeriodicError].contains(&part.law.cause);
@@ -474,7 +380,7 @@ fn few_periods(part: &Part) -> bool {
 }
 
 /// A ripple of few periods that is not there in each of them, or a vibration that is not there all the time.
-fn once_only(bench: &Bench, fit: &Fit) -> Option<usize> {
+pub fn once_only(bench: &Bench, fit: &Fit) -> Option<usize> {
     (0..fit.parts.len()).find(|&i| {
         let Part { law, shape, .. } = &fit.parts[i];
         if law.cause == Cause::ExternalVibration {
@@ -498,16 +404,4 @@ fn without_neighbours(fit: &Fit, part: usize) -> Vec<f64> {
         add(&mut left, 1.0, &fit.contribution(other));
     }
     left
-}
-
-/// Whether held-out blocks bear out what `full` gains over `less`.
-fn borne_out(bench: &Bench, less: &Fit, full: &Fit) -> bool {
-    let gained: Vec<f64> = less.residual.iter().zip(&full.residual).map(|(less, full)| less - full).collect();
-    let blocks = blocks::within(bench, &[gained], MOST_IN_A_BLOCK);
-    let (a, b) = (blocks::held_out(bench, less, &blocks), blocks::held_out(bench, full, &blocks));
-    let gains: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
-    let mean = gains.iter().sum::<f64>() / gains.len() as f64;
-    let scatter = (gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (gains.len() as f64 - 1.0)).sqrt();
-    let in_sample = (less.squares() - full.squares()) / gains.len() as f64;
-    mean > 0.5 * in_sample && mean * (gains.len() as f64).sqrt() > LEAST_T * scatter
 }
