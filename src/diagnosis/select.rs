@@ -229,16 +229,20 @@ impl Child<'_> {
 fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit>, Stopped> {
     let Search { bench, laws, watch, .. } = search;
     let open = beam.iter().flat_map(|set| laws.iter().filter(|law| may_join(set, law)).map(move |law| (set, *law)));
-    // Simulations take longest. Beside other causes they are asked where no law that is worked out row by row is to be carried on
-    // and leaves little: beside one that is they are asked next, which shows what only imitates them.
+    // Simulations take longest. Beside causes without one they are asked where no law that is worked out row by row is to be
+    // carried on and halves what is left, or leaves little: beside one that is they are asked next, which shows what only
+    // imitates them.
+    let simulated = |set: &Fit| set.parts.iter().any(|part| part.law.manner.simulated);
+    let asked_last = beam.iter().all(|set| !set.parts.is_empty() && !simulated(set));
     let (mut first, last): (Vec<_>, Vec<_>) =
-        open.partition(|(set, law): &(&Fit, &Law)| !law.manner.simulated || set.parts.is_empty());
+        open.partition(|(_, law): &(&Fit, &Law)| !(asked_last && law.manner.simulated));
     // What takes longest is begun first, lest a core have nothing left to do beside it.
     first.sort_by_key(|(_, law)| !law.manner.approached);
     let half = if last.is_empty() { to } else { 0.5 * (from + to) };
     let mut grown = with_one_more(search, &first, &[], (from, half))?;
     let so_far = beam.iter().map(price).fold(f64::INFINITY, f64::min);
-    let suffices = |fit: &Fit| is_more(so_far, fit) && Excess::of(bench, fit, fit).largest() < LITTLE_LEFT;
+    let leaves_little = |fit: &Fit| Excess::of(bench, fit, fit).largest() < LITTLE_LEFT;
+    let suffices = |fit: &Fit| is_more(so_far, fit) && (beam.iter().all(|set| fit.halves(set)) || leaves_little(fit));
     if !last.is_empty() && !grown.first().is_some_and(suffices) {
         let more = with_one_more(search, &last, &grown, (half, to))?;
         grown.extend(more);
