@@ -357,6 +357,9 @@ static void wrong_calls_are_refused_and_safe(void **state)
     assert_int_equal(gib_backlash_abort((gib_backlash *)(void *)junk), GIB_ERR_HANDLE);
     c.struct_size = 8;
     assert_int_equal(gib_backlash_start(b->gib, &c), GIB_ERR_STRUCT_SIZE);
+    assert_int_equal(gib_backlash_last_error(b->gib, &detail), GIB_OK);
+    assert_string_equal(detail.field, "struct_size");
+    assert_true(detail.value == 8.0 && detail.low > 8.0);
     c = quick_config();
     c.cycle_s = 1.0;
     assert_int_equal(gib_backlash_start(b->gib, &c), GIB_ERR_CONFIG);

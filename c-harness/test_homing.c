@@ -213,6 +213,9 @@ static void refuses_what_it_cannot_do(void **state)
     g.direction = 1;
     g.struct_size = 8;
     assert_int_equal(gib_homing_start(gib, &g), GIB_ERR_STRUCT_SIZE);
+    assert_int_equal(gib_homing_last_error(gib, &detail), GIB_OK);
+    assert_string_equal(detail.field, "struct_size");
+    assert_true(detail.value == 8.0 && detail.low > 8.0);
     g.struct_size = sizeof g;
     assert_int_equal(gib_homing_start(gib, &g), GIB_OK);
     assert_int_equal(gib_homing_start(gib, &g), GIB_ERR_STATE);

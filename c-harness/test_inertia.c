@@ -149,6 +149,9 @@ static void pointers_and_handles_are_checked(void **state)
     assert_int_equal(gib_inertia_start(NULL, &c), GIB_ERR_NULL);
     c.struct_size = 8;
     assert_int_equal(gib_inertia_start(gib, &c), GIB_ERR_STRUCT_SIZE);
+    assert_int_equal(gib_inertia_last_error(gib, &detail), GIB_OK);
+    assert_string_equal(detail.field, "struct_size");
+    assert_true(detail.value == 8.0 && detail.low > 8.0);
     c = usual();
     c.acceleration_rpm_s = NAN;
     assert_int_equal(gib_inertia_start(gib, &c), GIB_ERR_CONFIG);

@@ -1,6 +1,6 @@
 //! Family `backlash`: lost motion of one axis from motor torque, as seen from C.
 
-use super::guard::{Instance, guarded, instance, instance_mut, kept, placed, versioned};
+use super::guard::{CONFIG, Instance, guarded, instance, instance_mut, kept, placed, versioned};
 use super::types::GibErrorDetail;
 use crate::cycle::backlash::config::BacklashConfig;
 use crate::cycle::backlash::io::{BacklashInput, BacklashOutput, GIB_BACKLASH_FAILED};
@@ -124,8 +124,8 @@ pub unsafe extern "C" fn gib_backlash_start(handle: *mut GibBacklash, config: *c
         // SAFETY: the caller's promise.
         let handle = unsafe { instance_mut(handle) }?;
         // SAFETY: the caller's promise; the config is plain numbers.
-        let config = unsafe { versioned(config, BacklashConfig::FIRST_SIZE) }?;
-        Ok(refusable(handle, |machine| machine.start(Plan::new(&config))))
+        let config = unsafe { versioned(CONFIG, config, BacklashConfig::FIRST_SIZE) };
+        Ok(refusable(handle, |machine| machine.start(config.and_then(|config| Plan::new(&config)))))
     })
 }
 

@@ -1,6 +1,6 @@
 //! Family `calibration`: accelerometers against a ball bar, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, kept, placed, versioned};
+use super::guard::{CONFIG, guarded, instance, instance_mut, kept, placed, versioned};
 use super::text::path_of;
 use super::types::GibErrorDetail;
 use crate::cycle::calibration::config::CalibrationConfig;
@@ -110,8 +110,8 @@ pub unsafe extern "C" fn gib_calibration_start(handle: *mut GibCalibration, conf
         // SAFETY: the caller's promise.
         let handle = unsafe { instance_mut(handle) }?;
         // SAFETY: the caller's promise; the config is plain numbers.
-        let config = unsafe { versioned(config, CalibrationConfig::FIRST_SIZE) }?;
-        let outcome = handle.machine.start(Plan::new(&config));
+        let config = unsafe { versioned(CONFIG, config, CalibrationConfig::FIRST_SIZE) };
+        let outcome = handle.machine.start(config.and_then(|config| Plan::new(&config)));
         Ok(kept(&mut handle.last, outcome))
     })
 }

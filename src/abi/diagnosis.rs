@@ -1,11 +1,12 @@
 //! Family `diagnosis`: what a simulation gets wrong, why, and what knowing it is worth, as seen from C. Off the cycle.
 
-use super::guard::{Instance, guarded, instance, versioned};
+use super::guard::{CONFIG, Instance, guarded, instance, versioned};
 use super::machine::{GibMachine, file_status};
 use super::text::{copy_out, path_if_any, path_of, text_if_any};
 use crate::diagnosis::{Diagnosis, Verdict, axis_of, diagnose, usable};
 use crate::error::{
-    GIB_DONE, GIB_ERR_ABORTED, GIB_ERR_DIAGNOSIS_AXIS, GIB_ERR_DIAGNOSIS_HOLDOUT, GIB_ERR_NULL, GIB_ERR_STATE, GIB_OK,
+    Fault, GIB_DONE, GIB_ERR_ABORTED, GIB_ERR_DIAGNOSIS_AXIS, GIB_ERR_DIAGNOSIS_HOLDOUT, GIB_ERR_NULL, GIB_ERR_STATE,
+    GIB_ERR_STRUCT_SIZE, GIB_OK,
 };
 use crate::machine::Machine;
 use crate::recording::Recording;
@@ -194,7 +195,15 @@ pub unsafe extern "C" fn gib_diagnosis_start(handle: *mut GibDiagnosis, config: 
         *work = Work::default();
         handle.stop.store(false, Ordering::Relaxed);
         // SAFETY: the caller's promise.
-        let config = unsafe { versioned(config, size_of::<GibDiagnosisConfig>()) }?;
+        let config = unsafe { versioned(CONFIG, config, size_of::<GibDiagnosisConfig>()) }.map_err(|fault| {
+            let Fault { code, value, high, .. } = fault;
+            if code == GIB_ERR_STRUCT_SIZE {
+                work.last = format!(
+                    "struct_size is {value}, not {high}: set it to sizeof, and zero the rest before you fill it"
+                );
+            }
+            code
+        })?;
         // SAFETY: the caller's promise.
         let machine = unsafe { instance(config.machine) }?.machine.as_ref().ok_or(GIB_ERR_STATE)?;
         // SAFETY: the caller's promise, for the three of them.

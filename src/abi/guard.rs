@@ -13,6 +13,13 @@ pub fn guarded(call: impl FnOnce() -> Result<i32, i32>) -> i32 {
     }
 }
 
+/// A versioned struct's name as a parameter, and that of its size, for `_last_error`.
+pub type Named = [&'static str; 2];
+/// A configuration.
+pub const CONFIG: Named = ["config\0", "struct_size\0"];
+/// A table beside it.
+pub const TABLE: Named = ["table\0", "table.struct_size\0"];
+
 /// Reads a caller's versioned struct, which starts with `uint32_t struct_size`.
 ///
 /// A shorter struct (an older caller) is accepted down to `first_size`: the fields it lacks become zero, which
@@ -23,23 +30,26 @@ pub fn guarded(call: impl FnOnce() -> Result<i32, i32>) -> i32 {
 /// which all-zero is a valid value.
 ///
 /// # Errors
-/// `GIB_ERR_NULL`, `GIB_ERR_STRUCT_SIZE`.
-pub unsafe fn versioned<T: Copy>(pointer: *const T, first_size: usize) -> Result<T, i32> {
+/// `GIB_ERR_NULL`, `GIB_ERR_STRUCT_SIZE` with the sizes that are read.
+pub unsafe fn versioned<T: Copy>(name: Named, pointer: *const T, first_size: usize) -> Result<T, Fault> {
     const LARGEST: usize = 4096; // a struct_size beyond this is garbage, not a newer caller
+    let [parameter, field] = name;
     if pointer.is_null() {
-        return Err(GIB_ERR_NULL);
+        return Err(Fault { field: parameter, ..Fault::of(GIB_ERR_NULL) });
     }
     let bytes = pointer.cast::<u8>();
     // SAFETY: the caller promises `struct_size` readable bytes, and the size itself is the first four of them.
     let size = unsafe { pointer.cast::<u32>().read_unaligned() } as usize;
+    let (value, low, high) = (size as f64, first_size as f64, size_of::<T>() as f64);
+    let refused = Fault { code: GIB_ERR_STRUCT_SIZE, field, value, low, high };
     if size < first_size || size > LARGEST {
-        return Err(GIB_ERR_STRUCT_SIZE);
+        return Err(refused);
     }
     let known = size.min(size_of::<T>());
     for i in known..size {
         // SAFETY: i < struct_size.
         if unsafe { *bytes.add(i) } != 0 {
-            return Err(GIB_ERR_STRUCT_SIZE);
+            return Err(refused);
         }
     }
     let mut value = core::mem::MaybeUninit::<T>::zeroed();

@@ -1,6 +1,6 @@
 //! Family `homing`: homing on a dead stop by torque limit, as seen from C.
 
-use super::guard::{Instance, guarded, instance, instance_mut, kept, placed, versioned};
+use super::guard::{CONFIG, Instance, guarded, instance, instance_mut, kept, placed, versioned};
 use super::types::GibErrorDetail;
 use crate::cycle::homing::config::HomingConfig;
 use crate::cycle::homing::io::{GIB_HOMING_FAILED, HomingInput, HomingOutput};
@@ -130,8 +130,8 @@ pub unsafe extern "C" fn gib_homing_start(handle: *mut GibHoming, config: *const
         // SAFETY: the caller's promise.
         let handle = unsafe { instance_mut(handle) }?;
         // SAFETY: the caller's promise; the config is plain numbers.
-        let config = unsafe { versioned(config, HomingConfig::FIRST_SIZE) }?;
-        Ok(refusable(handle, |machine| machine.start(Plan::new(&config))))
+        let config = unsafe { versioned(CONFIG, config, HomingConfig::FIRST_SIZE) };
+        Ok(refusable(handle, |machine| machine.start(config.and_then(|config| Plan::new(&config)))))
     })
 }
 

@@ -1,6 +1,6 @@
 //! Family `inertia`: inertia and friction of a spindle from torque and speed, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, kept, placed, versioned};
+use super::guard::{CONFIG, guarded, instance, instance_mut, kept, placed, versioned};
 use super::types::GibErrorDetail;
 use crate::cycle::inertia::config::InertiaConfig;
 use crate::cycle::inertia::io::{GIB_INERTIA_FAILED, InertiaInput, InertiaOutput};
@@ -104,8 +104,8 @@ pub unsafe extern "C" fn gib_inertia_start(handle: *mut GibInertia, config: *con
         // SAFETY: the caller's promise.
         let handle = unsafe { instance_mut(handle) }?;
         // SAFETY: the caller's promise; the config is plain numbers.
-        let config = unsafe { versioned(config, InertiaConfig::FIRST_SIZE) }?;
-        let outcome = handle.machine.start(Plan::new(&config));
+        let config = unsafe { versioned(CONFIG, config, InertiaConfig::FIRST_SIZE) };
+        let outcome = handle.machine.start(config.and_then(|config| Plan::new(&config)));
         Ok(kept(&mut handle.last, outcome))
     })
 }

@@ -1,6 +1,6 @@
 //! Family `learning`: a command that is learnt from revolution to revolution, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, kept, placed, versioned};
+use super::guard::{CONFIG, guarded, instance, instance_mut, kept, placed, versioned};
 use super::text::path_of;
 use super::types::GibErrorDetail;
 use crate::cycle::learning::config::LearningConfig;
@@ -105,8 +105,8 @@ pub unsafe extern "C" fn gib_learning_start(handle: *mut GibLearning, config: *c
         // SAFETY: the caller's promise.
         let handle = unsafe { instance_mut(handle) }?;
         // SAFETY: the caller's promise; the config is plain numbers.
-        let config = unsafe { versioned(config, LearningConfig::FIRST_SIZE) }?;
-        let outcome = handle.machine.start(Plan::new(&config));
+        let config = unsafe { versioned(CONFIG, config, LearningConfig::FIRST_SIZE) };
+        let outcome = handle.machine.start(config.and_then(|config| Plan::new(&config)));
         Ok(kept(&mut handle.last, outcome))
     })
 }

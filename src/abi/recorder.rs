@@ -1,6 +1,6 @@
 //! Family `recorder`: channels at servo rate into shared memory, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, placed, versioned};
+use super::guard::{CONFIG, guarded, instance, instance_mut, placed, versioned};
 use super::shared_memory::{SharedMemory, copy, gather};
 use super::types::GibErrorDetail;
 use crate::cycle::recorder::layout::{HEAD, Shape};
@@ -232,12 +232,13 @@ pub unsafe extern "C" fn gib_recorder_start(handle: *mut GibRecorder, config: *c
     guarded(|| {
         // SAFETY: the caller's promise.
         let handle = unsafe { instance_mut(handle) }?;
-        // SAFETY: the caller's promise; zero is a legal value of every field.
-        let c = unsafe { versioned(config, GibRecorderConfig::FIRST_SIZE) }?;
         if handle.memory.is_some() {
             return Err(GIB_ERR_STATE);
         }
-        let begun = Shape::new(c.channels, c.capacity_rows, c.every_cycles, c.cycle_s).and_then(|shape| {
+        // SAFETY: the caller's promise; zero is a legal value of every field.
+        let config = unsafe { versioned(CONFIG, config, GibRecorderConfig::FIRST_SIZE) };
+        let begun = config.and_then(|c| {
+            let shape = Shape::new(c.channels, c.capacity_rows, c.every_cycles, c.cycle_s)?;
             let mode = if c.mode == 0 { 0o600 } else { c.mode };
             // SAFETY: the caller promises NUL-terminated texts, used within this call only.
             let (name, machine, columns) =

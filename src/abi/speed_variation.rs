@@ -1,6 +1,6 @@
 //! Family `speed_variation`: spindle speed variation within the motor's limits, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, kept, placed, versioned};
+use super::guard::{CONFIG, guarded, instance, instance_mut, kept, placed, versioned};
 use super::types::GibErrorDetail;
 use crate::cycle::speed_variation::config::{SpeedVariationConfig, SpeedVariationLimits};
 use crate::cycle::speed_variation::io::{GIB_SPEED_VARIATION_FAILED, SpeedVariationInput, SpeedVariationOutput};
@@ -110,8 +110,8 @@ pub unsafe extern "C" fn gib_speed_variation_start(
         // SAFETY: the caller's promise.
         let handle = unsafe { instance_mut(handle) }?;
         // SAFETY: the caller's promise; the config is plain numbers.
-        let config = unsafe { versioned(config, SpeedVariationConfig::FIRST_SIZE) }?;
-        let outcome = handle.machine.start(Plan::to_start(&config));
+        let config = unsafe { versioned(CONFIG, config, SpeedVariationConfig::FIRST_SIZE) };
+        let outcome = handle.machine.start(config.and_then(|config| Plan::to_start(&config)));
         Ok(kept(&mut handle.last, outcome))
     })
 }
@@ -263,8 +263,9 @@ pub unsafe extern "C" fn gib_speed_variation_possible(
         let limits = unsafe { limits.as_mut() }.ok_or(GIB_ERR_NULL)?;
         *limits = SpeedVariationLimits::default();
         // SAFETY: the caller's promise; the config is plain numbers.
-        let config = unsafe { versioned(config, SpeedVariationConfig::FIRST_SIZE) }?;
-        *limits = Plan::new(&config).map_err(|fault| fault.code)?.limits();
+        let config = unsafe { versioned(CONFIG, config, SpeedVariationConfig::FIRST_SIZE) };
+        let plan = config.and_then(|config| Plan::new(&config)).map_err(|fault| fault.code)?;
+        *limits = plan.limits();
         Ok(GIB_OK)
     })
 }

@@ -1,6 +1,6 @@
 //! Family `tilt`: tilt of the workpiece plane from spindle load, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, kept, placed, versioned};
+use super::guard::{CONFIG, TABLE, guarded, instance, instance_mut, kept, placed, versioned};
 use super::types::GibErrorDetail;
 use crate::cycle::tilt::config::{GIB_TILT_TEACH, TiltConfig};
 use crate::cycle::tilt::io::{GIB_TILT_FAILED, TiltInput, TiltOutput};
@@ -121,13 +121,15 @@ pub unsafe extern "C" fn gib_tilt_start(
         // SAFETY: the caller's promise.
         let handle = unsafe { instance_mut(handle) }?;
         // SAFETY: the caller's promise; config and table are plain numbers.
-        let config = unsafe { versioned(config, TiltConfig::FIRST_SIZE) }?;
-        if config.purpose == GIB_TILT_TEACH {
-            return Ok(refusable(handle, |machine| machine.start(Plan::new(&config))));
-        }
-        // SAFETY: as above.
-        let table = unsafe { versioned(table, TiltTable::FIRST_SIZE) }?;
-        let plan = Plan::new(&config).and_then(|plan| plan.with_table(&config, &table));
+        let config = unsafe { versioned(CONFIG, config, TiltConfig::FIRST_SIZE) };
+        let plan = config.and_then(|config| match config.purpose {
+            GIB_TILT_TEACH => Plan::new(&config),
+            _ => {
+                // SAFETY: as above.
+                let table = unsafe { versioned(TABLE, table, TiltTable::FIRST_SIZE) }?;
+                Plan::new(&config)?.with_table(&config, &table)
+            }
+        });
         Ok(refusable(handle, |machine| machine.start(plan)))
     })
 }
@@ -291,7 +293,7 @@ pub unsafe extern "C" fn gib_tilt_table_add(
 ) -> i32 {
     let add = || {
         // SAFETY: the caller's promise.
-        let mut copy = unsafe { versioned(table, TiltTable::FIRST_SIZE) }.map_err(Fault::of)?;
+        let mut copy = unsafe { versioned(TABLE, table, TiltTable::FIRST_SIZE) }?;
         copy.add(depth_mm, load, load_std)?;
         // SAFETY: not NULL, or `versioned` had refused it.
         unsafe { table.write(copy) };
@@ -315,7 +317,7 @@ pub unsafe extern "C" fn gib_tilt_table_add(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn gib_tilt_table_check(table: *const TiltTable, detail: *mut GibErrorDetail) -> i32 {
     // SAFETY: the caller's promise.
-    unsafe { told(detail, || versioned(table, TiltTable::FIRST_SIZE).map_err(Fault::of)?.check()) }
+    unsafe { told(detail, || versioned(TABLE, table, TiltTable::FIRST_SIZE)?.check()) }
 }
 
 /// Writes a table to a file, JSON `gib.tilt_table/1`, with its condition; whole or not at all.
@@ -338,7 +340,7 @@ pub unsafe extern "C" fn gib_tilt_table_save(
 ) -> i32 {
     let save = || {
         // SAFETY: the caller's promise.
-        let (table, path) = unsafe { (versioned(table, TiltTable::FIRST_SIZE).map_err(Fault::of)?, named(path)?) };
+        let (table, path) = unsafe { (versioned(TABLE, table, TiltTable::FIRST_SIZE)?, named(path)?) };
         load_table::save(&table, path).map_err(|error| error.fault)
     };
     // SAFETY: the caller's promise is `told`'s.
@@ -364,7 +366,7 @@ pub unsafe extern "C" fn gib_tilt_table_load(
 ) -> i32 {
     let load = || {
         // SAFETY: the caller's promise.
-        let (_, path) = unsafe { (versioned(table, TiltTable::FIRST_SIZE).map_err(Fault::of)?, named(path)?) };
+        let (_, path) = unsafe { (versioned(TABLE, table, TiltTable::FIRST_SIZE)?, named(path)?) };
         let read = load_table::load(path).map_err(|error| error.fault)?;
         // SAFETY: not NULL, or `versioned` had refused it.
         unsafe { table.write(read) };
@@ -400,7 +402,7 @@ pub unsafe extern "C" fn gib_tilt_two_point(
         let null = Fault::of(GIB_ERR_NULL);
         // SAFETY: the caller's promise.
         let (table, position, load, result) = unsafe {
-            let table = versioned(table, TiltTable::FIRST_SIZE).map_err(Fault::of)?;
+            let table = versioned(TABLE, table, TiltTable::FIRST_SIZE)?;
             let pair = |numbers: *const f64| numbers.cast::<[f64; 2]>().as_ref().ok_or(null);
             (table, pair(position_mm)?, pair(load)?, result.as_mut().ok_or(null)?)
         };

@@ -1,6 +1,6 @@
 //! Family `vibration`: tool position corrected for vibration, as seen from C.
 
-use super::guard::{guarded, instance, instance_mut, kept, placed, versioned};
+use super::guard::{CONFIG, TABLE, guarded, instance, instance_mut, kept, placed, versioned};
 use super::types::GibErrorDetail;
 use crate::cycle::calibration::table::CalibrationTable;
 use crate::cycle::vibration::config::VibrationConfig;
@@ -109,11 +109,12 @@ pub unsafe extern "C" fn gib_vibration_start(
         // SAFETY: the caller's promise.
         let handle = unsafe { instance_mut(handle) }?;
         // SAFETY: the caller's promise; the config is plain numbers.
-        let config = unsafe { versioned(config, VibrationConfig::FIRST_SIZE) }?;
+        let config = unsafe { versioned(CONFIG, config, VibrationConfig::FIRST_SIZE) };
         // SAFETY: the caller's promise; the table is plain numbers.
-        let read = || unsafe { versioned(table, CalibrationTable::FIRST_SIZE) };
-        let table = if table.is_null() { None } else { Some(read()?) };
-        let outcome = handle.machine.start(Plan::new(&config, table.as_ref()));
+        let read = || unsafe { versioned(TABLE, table, CalibrationTable::FIRST_SIZE) };
+        let table = if table.is_null() { Ok(None) } else { read().map(Some) };
+        let plan = config.and_then(|config| Plan::new(&config, table?.as_ref()));
+        let outcome = handle.machine.start(plan);
         Ok(kept(&mut handle.last, outcome))
     })
 }

@@ -18,11 +18,11 @@ mod table;
 mod tilt;
 
 use std::error::Error;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
-use gib::recording::{Recording, Signal};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use gib::recording::{IssueKind, Recording, Signal};
 
 /// What a command has to say.
 pub struct Answer {
@@ -74,9 +74,28 @@ enum Command {
     Tilt(tilt::TiltCommand),
 }
 
+/// A number as a machinist may write it, `-0.5` too; whether it is allowed is said by who uses it, in its unit.
+fn decimal(text: &str) -> std::result::Result<f64, String> {
+    text.parse().map_err(|_| "a number with a decimal point, as 0.5, is wanted".to_owned())
+}
+
+/// The same for every number of a command and of those below it.
+fn with_decimals(command: clap::Command) -> clap::Command {
+    let numbers = |arg: clap::Arg| {
+        let number = arg.get_value_parser().type_id() == std::any::TypeId::of::<f64>();
+        if number { arg.value_parser(decimal).allow_negative_numbers(true) } else { arg }
+    };
+    command.mut_args(numbers).mut_subcommands(with_decimals)
+}
+
 /// Runs the command that was asked for.
 pub fn run() -> ExitCode {
-    let result = match Cli::parse().command {
+    let asked = with_decimals(Cli::command()).get_matches();
+    let command = match Cli::from_arg_matches(&asked) {
+        Ok(cli) => cli.command,
+        Err(why) => why.exit(),
+    };
+    let result = match command {
         Command::Diagnose(command) => command.run(),
         Command::Homing(command) => command.run(),
         Command::Inertia(command) => command.run(),
@@ -91,9 +110,15 @@ pub fn run() -> ExitCode {
     };
     match result {
         Ok(answer) => {
-            // A reader that has seen enough (`gib … | head`) is no error.
-            let _ = std::io::stdout().write_all(answer.text.as_bytes());
-            ExitCode::from(u8::from(!answer.good))
+            let mut out = std::io::stdout();
+            match out.write_all(answer.text.as_bytes()).and_then(|()| out.flush()) {
+                // A reader that has seen enough (`gib … | head`) is no error.
+                Err(why) if why.kind() != ErrorKind::BrokenPipe => {
+                    eprintln!("gib: standard output: {why}; the answer is not whole");
+                    ExitCode::from(2)
+                }
+                _ => ExitCode::from(u8::from(!answer.good)),
+            }
         }
         Err(why) => {
             eprintln!("gib: {why}");
@@ -109,9 +134,17 @@ fn axis(recording: &Recording, given: Option<&str>) -> std::result::Result<Strin
     match (given, axes.as_slice()) {
         (Some(axis), _) => Ok(axis.to_owned()),
         (None, [one]) => Ok((*one).to_owned()),
-        (None, []) => Err(format!("{}: has no column <axis>.position_<unit>", recording.file)),
+        (None, []) => Err(format!("{}: has no column <axis>.position_<unit>{}", recording.file, instead(recording))),
         (None, several) => {
             Err(format!("{}: has the axes {}; choose one with --axis", recording.file, several.join(", ")))
         }
     }
+}
+
+/// What a recording has in place of the column that is missing.
+fn instead(recording: &Recording) -> String {
+    let names: Vec<&str> = recording.columns.iter().map(|column| column.name.as_str()).collect();
+    let issues = recording.issues.iter().filter(|issue| issue.kind == IssueKind::WrongUnit);
+    let found = if names.is_empty() { "no columns but the time".to_owned() } else { names.join(", ") };
+    issues.fold(format!("; it has {found}"), |text, issue| format!("{text}\n  {issue}"))
 }

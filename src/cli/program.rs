@@ -42,7 +42,6 @@ struct Set {
     /// The part program
     file: PathBuf,
     /// The inertia, kg·m², with a decimal point
-    #[arg(allow_negative_numbers = true, value_parser = decimal)]
     inertia_kg_m2: f64,
     /// For this process step only, 1 to 9999 (INA2 is for step 2); 0 for the whole program
     #[arg(long, value_name = "N", default_value = "0", value_parser = scope)]
@@ -85,10 +84,6 @@ impl From<Spelling> for Dialect {
 pub(super) fn scope(text: &str) -> std::result::Result<Scope, String> {
     let number = text.parse().ok().and_then(Scope::from_number);
     number.ok_or_else(|| format!("a step is 1 to {}, or 0 for the whole program", Scope::LAST_STEP))
-}
-
-fn decimal(text: &str) -> std::result::Result<f64, String> {
-    text.parse().map_err(|_| "a number with a decimal point, as 0.5, is wanted".to_owned())
 }
 
 impl Program {

@@ -42,7 +42,7 @@ pub struct Simulate {
     #[arg(long, default_value_t = 25.0)]
     step_us: f64,
     /// Built-in moves: where the stroke begins
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0)]
     start_mm: f64,
     /// Built-in moves: length of the stroke
     #[arg(long, default_value_t = 200.0)]
@@ -63,7 +63,7 @@ pub struct Simulate {
     #[arg(long, default_value_t = 0.0)]
     sensor_delay_ms: f64,
     /// Scale error of the encoder, µm per m
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0)]
     scale_um_m: f64,
     /// Eccentricity of the encoder: amplitude once a motor revolution
     #[arg(long, default_value_t = 0.0)]

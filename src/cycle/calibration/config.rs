@@ -51,7 +51,8 @@ pub struct CalibrationConfig {
     pub tolerance_ratio: f64,
     /// Time of measuring at each frequency, 0.1 to 1000 s (default 4), rounded up to 32 periods at least.
     pub measure_s: f64,
-    /// Time in which the amplitude goes up or down, 0.01 to 10 s (default 0.5), five periods at least.
+    /// Time in which the amplitude goes up or down, 0.01 to 10 s (default 0.5), five periods at least; turned round on its way up, a
+    /// quarter more.
     pub ramp_s: f64,
     /// Largest |target - position|, up to 100 mm (default the stroke).
     pub lag_limit_mm: f64,

@@ -5,7 +5,7 @@
 //!          any state ──fault, abort──▶ leave: Stopping → Failed
 //! ```
 //!
-//! The command is start + a·sin φ. Only the amplitude a is ever changed, by a bounded step a cycle, so every way out, by the
+//! The command is start + a·sin φ. Only the amplitude a is ever changed, with bounded speed and acceleration of its own, so every way out, by the
 //! one door `leave`, lets a fall to nothing and ends where the axis stood. Each moving state lasts a number of cycles that
 //! is known when it is entered; that is its deadline.
 
@@ -16,6 +16,7 @@ use super::io::*;
 use super::plan::{BLOCKS, Plan};
 use super::solve::{Complex, Experiment, Gains, least_squares, published};
 use super::table::{CalibrationPoint, CalibrationTable, GIB_CALIBRATION_POINTS};
+use crate::cycle::profile::Profile;
 use crate::cycle::turns::{cos_sin, fold};
 use crate::error::*;
 use danger::stops;
@@ -75,8 +76,7 @@ pub struct Calibration {
     start: f64,
     /// Present frequency.
     point: usize,
-    amplitude: f64,
-    goal: f64,
+    amplitude: Profile,
     /// The amplitude that was chosen is the one to measure with.
     chosen: bool,
     probes: u32,
@@ -103,8 +103,7 @@ impl Default for Calibration {
             fault: Fault::NONE,
             start: 0.0,
             point: 0,
-            amplitude: 0.0,
-            goal: 0.0,
+            amplitude: Profile::default(),
             chosen: false,
             probes: 0,
             cycle: 0,
@@ -143,7 +142,7 @@ impl Calibration {
         // What a run before has found is no result of this one.
         self.table.count = 0;
         self.point = 0;
-        (self.amplitude, self.goal, self.phase_turns) = (0.0, 0.0, 0.0);
+        self.phase_turns = 0.0;
         self.output = CalibrationOutput { target_position_mm: self.output.target_position_mm, ..Default::default() };
         self.enter(Phase::Begin);
         Ok(())
@@ -225,22 +224,25 @@ impl Calibration {
         self.probes = 0;
         self.chosen = false;
         (self.cycle, self.phase_turns) = (0, 0.0);
+        self.amplitude = Profile::at_rest(0.0, self.plan.tone(self.point).bend);
         self.rise(FIRST * self.plan.tone(self.point).amplitude);
     }
 
     /// Goes to another amplitude, and stays there for a block before it is looked at.
     fn rise(&mut self, amplitude: f64) {
-        self.goal = amplitude;
+        self.change_to(amplitude);
         self.block = 0;
         self.enter(Phase::Rise);
     }
 
+    fn change_to(&mut self, amplitude: f64) {
+        let slope = self.plan.tone(self.point).slope;
+        self.amplitude.go(amplitude, slope);
+    }
+
     /// A cycle in which nothing is read.
     fn swing(&mut self) {
-        let slope = self.plan.tone(self.point).slope;
-        let left = self.goal - self.amplitude;
-        let arrived = left.abs() <= slope;
-        self.amplitude = if arrived { self.goal } else { self.amplitude + slope.copysign(left) };
+        let arrived = self.amplitude.step();
         let whole = self.turn();
         match self.phase {
             // A whole block at the new amplitude lets what the ramp has set swinging die away.
@@ -313,11 +315,11 @@ impl Calibration {
         let [s1, s2, s3] = plan.saturation;
         let most = [USED * s1, USED * s2, USED * s3, plan.torque_wanted];
         let used = self.detectors.iter().zip(most).map(|(d, most)| d.peak() / most).fold(1e-3, f64::max);
-        let most = plan.tone(self.point).amplitude;
-        let amplitude = (self.amplitude * (1.0 / used).min(GROWTH_MAX)).min(most);
+        let (now, most) = (self.amplitude.position, plan.tone(self.point).amplitude);
+        let amplitude = (now * (1.0 / used).min(GROWTH_MAX)).min(most);
         self.probes += 1;
         // Too much already is brought down at once; a little more is not worth a probe.
-        self.chosen = amplitude < self.amplitude * GROWTH_MIN || self.probes >= PROBES;
+        self.chosen = amplitude < now * GROWTH_MIN || self.probes >= PROBES;
         self.rise(amplitude);
     }
 
@@ -337,11 +339,11 @@ impl Calibration {
             bearing: bearing_um,
             relative: bar.value,
             variance: v1 + v2 + bar.variance,
-            amplitude: self.amplitude,
+            amplitude: self.amplitude.position,
         };
         let place = self.count & (GIB_CALIBRATION_EXPERIMENTS - 1);
         self.experiments[self.point & (GIB_CALIBRATION_POINTS - 1)][place] = experiment;
-        self.goal = 0.0;
+        self.change_to(0.0);
         self.enter(Phase::Fall);
     }
 
@@ -413,12 +415,12 @@ impl Calibration {
             self.output.stop_drive = i32::from(stops(&fault) && fault.code != GIB_ERR_DRIVE_FAULT);
             return self.fail();
         }
-        self.goal = 0.0;
+        self.change_to(0.0);
         self.enter(Phase::Stopping);
     }
 
     fn fail(&mut self) {
-        self.amplitude = 0.0;
+        self.amplitude = Profile::default();
         self.enter(Phase::Failed);
         self.output.status = self.fault.code;
     }
@@ -431,10 +433,11 @@ impl Calibration {
         let tone = self.plan.tone(point);
         self.wheel = cos_sin(self.phase_turns);
         let (cos, sin) = self.wheel;
-        self.output.target_position_mm = self.start + self.amplitude * sin;
-        self.output.target_speed_mm_s = self.amplitude * tone.omega() * cos;
+        let Profile { position: amplitude, speed: slope, .. } = self.amplitude;
+        self.output.target_position_mm = self.start + amplitude * sin;
+        self.output.target_speed_mm_s = amplitude * tone.omega() * cos + slope * self.plan.cycles_per_s * sin;
         self.output.frequency_hz = tone.frequency;
-        self.output.amplitude_mm = self.amplitude;
+        self.output.amplitude_mm = amplitude;
         self.output.point = point as i32;
     }
 

@@ -8,6 +8,9 @@ use core::f64::consts::TAU;
 /// Blocks into which a measurement is cut; their scatter gives the uncertainty.
 pub const BLOCKS: u32 = 8;
 
+/// Part of the acceleration that the swinging itself may take; a bent change of its amplitude takes 0.8 % at most.
+const SWINGING: f64 = 0.99;
+
 /// One frequency of the list.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Tone {
@@ -21,8 +24,10 @@ pub struct Tone {
     pub cycles: u32,
     /// Largest amplitude that stroke, speed and acceleration allow, mm.
     pub amplitude: f64,
-    /// Change of the amplitude in a cycle, mm.
+    /// Largest change of the amplitude in a cycle, mm, and of that change in the next, mm.
     pub slope: f64,
+    /// See `slope`.
+    pub bend: f64,
 }
 
 impl Tone {
@@ -46,6 +51,8 @@ pub struct Plan {
     pub tones: [Tone; GIB_CALIBRATION_POINTS],
     /// Servo period, s.
     pub cycle: f64,
+    /// Its reciprocal, 1/s.
+    pub cycles_per_s: f64,
     /// Largest way from the start, with what the servo overshoots.
     pub travel: f64,
     /// Torque never to be exceeded, and the one to choose the amplitude for.
@@ -66,9 +73,10 @@ impl Plan {
         published: false,
         add: false,
         count: 0,
-        tones: [Tone { listed: 0.0, frequency: 0.0, periods: 1, cycles: 1, amplitude: 0.0, slope: 0.0 };
+        tones: [Tone { listed: 0.0, frequency: 0.0, periods: 1, cycles: 1, amplitude: 0.0, slope: 0.0, bend: 0.0 };
             GIB_CALIBRATION_POINTS],
         cycle: 1e-3,
+        cycles_per_s: 1e3,
         travel: 0.0,
         torque_bound: 0.0,
         torque_wanted: 0.0,
@@ -108,15 +116,18 @@ impl Plan {
             let cycles = (periods / (listed * cycle) + 0.5).floor();
             let frequency = periods / (cycles * cycle);
             let omega = TAU * frequency;
-            let amplitude = stroke.min(speed / omega).min(hard / (omega * omega));
-            let rise = ramp.max(5.0 / frequency);
+            let amplitude = stroke.min(speed / omega).min(SWINGING * hard / (omega * omega));
+            // A quarter of the ramp each to get going and to come to rest, and it takes the time that it is to take.
+            let rise = ramp.max(5.0 / frequency) / cycle;
+            let slope = 4.0 / 3.0 * amplitude / rise;
             *tone = Tone {
                 listed,
                 frequency,
                 periods: periods as u32,
                 cycles: cycles as u32,
                 amplitude,
-                slope: amplitude * cycle / rise,
+                slope,
+                bend: slope / (0.25 * rise),
             };
         }
         Ok(Plan {
@@ -125,6 +136,7 @@ impl Plan {
             count,
             tones,
             cycle,
+            cycles_per_s: 1.0 / cycle,
             travel: 1.2 * stroke + 0.1,
             torque_bound: bound,
             torque_wanted: share * bound,

@@ -167,6 +167,7 @@ impl Learning {
             return Err(Fault::of(GIB_ERR_STATE));
         }
         let plan = plan?;
+        self.settle_usual();
         let held = f64::from(self.report.points);
         if plan.resume && held != plan.scale {
             return Err(Fault { code: GIB_ERR_CONFIG, field: "points\0", value: plan.scale, low: held, high: held });

@@ -51,7 +51,7 @@ pub type Table = [Cell; ENTRIES];
 /// Where on the revolution an angle is.
 #[derive(Debug, Clone, Copy)]
 pub struct Place {
-    /// Nearest entry.
+    /// Nearest entry; of an angle up to a turn beyond them, one beyond those that there are.
     pub entry: usize,
     /// How far beyond it, in points, −0.5 to 0.5.
     pub beyond: f64,
@@ -70,7 +70,7 @@ impl Place {
     #[must_use]
     pub fn at(points: f64) -> Place {
         let rounded = points + ROUNDING;
-        Place { entry: rounded.to_bits() as usize & (ENTRIES - 1), beyond: points - (rounded - ROUNDING) }
+        Place { entry: rounded.to_bits() as usize & (2 * ENTRIES - 1), beyond: points - (rounded - ROUNDING) }
     }
 
     /// What a table says there.
@@ -96,6 +96,15 @@ pub fn close(table: &mut Table, points: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_angle_beyond_the_turn_is_no_entry() {
+        for points in (16..=1024).step_by(2) {
+            for beyond in [0.6, 2.0, 0.25 * points as f64] {
+                assert!(Place::at(points as f64 + beyond).entry > points && Place::at(-beyond).entry > points);
+            }
+        }
+    }
 
     #[test]
     fn every_angle_finds_its_point_and_half_a_turn_is_one() {

@@ -30,6 +30,7 @@ impl Learning {
     /// Takes a whole revolution from elsewhere, at most 1024 points, in the order of `point`; not while busy.
     pub fn install(&mut self, points: impl ExactSizeIterator<Item = LearningPoint>) {
         let count = points.len().min(ENTRIES);
+        self.settle_usual();
         // A correction that was in force leaves the command by bounded steps, so its speed stays, too.
         let (plan, angle, command, correction) = (self.plan, self.angle, self.command, self.correction);
         *self = Learning { plan, angle, command, correction, ..Learning::default() };

@@ -1,7 +1,7 @@
 //! The usual cycle: all goes on as before, the correction in force is kept, and while measuring a point is read.
 //!
 //! It does what `careful` would do, without asking for all that can happen. After any other cycle that one says for how many
-//! cycles more nothing ends, that the correction cannot change too fast meanwhile, and what is put off until then: angles less
+//! cycles more nothing ends, whether the correction could change too fast meanwhile, and what is put off until then: angles less
 //! whole turns, the measured speed, what has turned. A reading weighs 1, for the speed is steady.
 
 use super::*;
@@ -29,6 +29,8 @@ pub enum Kind {
 #[derive(Debug, Clone, Copy)]
 pub struct Usual {
     kind: Kind,
+    /// Whether the correction is so steep for this speed that each cycle asks how much it changes.
+    steep: bool,
     /// Cycles more that can be usual, of how many.
     left: u32,
     granted: u32,
@@ -49,6 +51,7 @@ impl Usual {
     /// No usual cycles.
     pub const NONE: Usual = Usual {
         kind: Kind::None,
+        steep: false,
         left: 0,
         granted: 0,
         next: 0.0,
@@ -85,13 +88,20 @@ impl Learning {
         let behind = (Place::at(at).read(&self.force) - self.correction).abs();
         // Half a point beyond any it is still within its bound, which a usual cycle does not look at.
         let within = self.report.correction_um + 0.5 * self.steepest <= self.plan.most;
-        let smooth = within && change + behind <= self.plan.slope;
-        if !(steady && smooth && self.reasons == 0 && self.presence == 1.0 && self.blend == 0.0 && cycles >= 1.0) {
+        if !(steady
+            && within
+            && behind <= self.plan.slope
+            && self.reasons == 0
+            && self.presence == 1.0
+            && self.blend == 0.0
+            && cycles >= 1.0)
+        {
             return;
         }
         let (pace, granted) = (self.rate * self.plan.scale, cycles.min(MOST) as u32);
         self.usual = Usual {
             kind: if self.phase == Phase::Measure { Kind::Measured } else { Kind::Kept },
+            steep: change + behind > self.plan.slope,
             left: granted,
             granted,
             next: at + pace,
@@ -121,15 +131,21 @@ impl Learning {
     /// Does this cycle if it is a usual one, and returns its status; else none with nothing changed.
     #[inline(always)]
     pub(super) fn quick(&mut self, input: &LearningInput, output: &mut LearningOutput) -> Option<i32> {
-        match self.usual.kind {
-            Kind::Measured => self.quick_as::<true>(input, output),
-            Kind::Kept => self.quick_as::<false>(input, output),
-            Kind::None => None,
+        match (self.usual.kind, self.usual.steep) {
+            (Kind::Measured, false) => self.quick_as::<true, false>(input, output),
+            (Kind::Measured, true) => self.quick_as::<true, true>(input, output),
+            (Kind::Kept, false) => self.quick_as::<false, false>(input, output),
+            (Kind::Kept, true) => self.quick_as::<false, true>(input, output),
+            (Kind::None, _) => None,
         }
     }
 
     #[inline(always)]
-    fn quick_as<const MEASURED: bool>(&mut self, input: &LearningInput, output: &mut LearningOutput) -> Option<i32> {
+    fn quick_as<const MEASURED: bool, const STEEP: bool>(
+        &mut self,
+        input: &LearningInput,
+        output: &mut LearningOutput,
+    ) -> Option<i32> {
         let usual = &mut self.usual;
         let at = input.angle_deg * self.plan.points_per_deg - usual.base;
         let place = Place::at(at);
@@ -140,12 +156,19 @@ impl Learning {
             return None;
         }
         let correction = place.read(&self.force);
+        if STEEP {
+            if (correction - self.correction).abs() > self.plan.slope {
+                return None;
+            }
+            self.correction = correction;
+        }
         let mut told = LearningOutput { status: GIB_BUSY, phase: GIB_LEARNING_MEASURE, ..LearningOutput::default() };
         if MEASURED {
-            let bin = &mut self.bins[place.entry];
+            let entry = place.entry & (ENTRIES - 1);
+            let bin = &mut self.bins[entry];
             bin.deviation += deviation;
             bin.target = input.target_mm;
-            let reads = &mut self.weights[place.entry].steady;
+            let reads = &mut self.weights[entry].steady;
             *reads = reads.wrapping_add(1);
         } else {
             told = usual.told;
