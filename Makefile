@@ -88,16 +88,18 @@ install: build ## into $(DESTDIR)$(PREFIX)
 	sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|; s|@INCLUDEDIR@|$(INCLUDEDIR)|; s|@VERSION@|$(VERSION)|' \
 	    tools/gib.pc.in > $(DESTDIR)$(LIBDIR)/pkgconfig/gib.pc
 	$(INSTALL) -m 755 $(RELEASE)/gib $(DESTDIR)$(BINDIR)/gib
-	$(INSTALL) -m 644 $(DOCS) $(DESTDIR)$(DOCDIR)
+	@for file in $(DOCS); do $(INSTALL) -D -m 644 $$file $(DESTDIR)$(DOCDIR)/$$file; done
 	@test -n "$(DESTDIR)" || ldconfig 2>/dev/null || true
 
-DOCS := $(wildcard README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE)
+# With their folders, so that the links of the README hold.
+DOCS := $(wildcard README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE docs/*.md docs/*.svg c-harness/kernel.h)
 
 uninstall: ## remove exactly what install wrote
 	rm -f $(DESTDIR)$(INCLUDEDIR)/gib.h $(DESTDIR)$(LIBDIR)/pkgconfig/gib.pc $(DESTDIR)$(BINDIR)/gib
 	rm -f $(addprefix $(DESTDIR)$(LIBDIR)/,libgib.so.$(VERSION) libgib.so.0 libgib.so libgib.a)
 	rm -f $(addprefix $(DESTDIR)$(DOCDIR)/,$(DOCS))
-	@test ! -d $(DESTDIR)$(DOCDIR) || rmdir --ignore-fail-on-non-empty $(DESTDIR)$(DOCDIR)
+	@for folder in $(addprefix $(DESTDIR)$(DOCDIR),/docs /c-harness ""); do \
+	    test ! -d $$folder || rmdir --ignore-fail-on-non-empty $$folder; done
 	@test -n "$(DESTDIR)" || ldconfig 2>/dev/null || true
 
 clean: ## remove everything that make builds

@@ -202,6 +202,13 @@ static void every_refusal(void **state)
     REFUSED(columns, "x.position_mm,x.torque_mm", GIB_ERR_RECORDER_COLUMN);
     REFUSED(columns, "x.position_mm,time_s", GIB_ERR_RECORDER_COLUMN);
     REFUSED(columns, "x.position_mm,a b", GIB_ERR_RECORDER_COLUMN);
+    /* The number of a wrong column stands without a range, a wrong count with the one wanted. */
+    gib_error_detail detail;
+    assert_int_equal(gib_recorder_last_error(f->gib, &detail), GIB_OK);
+    assert_true(detail.value == 2.0 && detail.low == 0.0 && detail.high == 0.0);
+    REFUSED(columns, "x.position_mm", GIB_ERR_RECORDER_COLUMN);
+    assert_int_equal(gib_recorder_last_error(f->gib, &detail), GIB_OK);
+    assert_true(detail.value == 1.0 && detail.low == detail.high && detail.low > 1.0);
     c = f->config;
     c.struct_size = 8;
     assert_int_equal(gib_recorder_start(f->gib, &c), GIB_ERR_STRUCT_SIZE);

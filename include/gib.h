@@ -386,7 +386,8 @@
 #define GIB_ERR_RECORDER_FOREIGN (-1001)
 
 /**
- * The name of a column is misspelled, has a unit that its signal cannot have, or stands twice; `value` is its number.
+ * The name of a column is misspelled, has a unit that its signal cannot have, or stands twice: `value` is its number, without a
+ * range. Or there is not one name a channel: `value` is how many there are, and the range how many there are to be.
  */
 #define GIB_ERR_RECORDER_COLUMN (-1002)
 
@@ -1173,7 +1174,8 @@
 #define GIB_TILT_INPUT_END 8
 
 /**
- * Input flag: take the offsets out; the family then ends well.
+ * Input flag: take the offsets out; the family then ends well. In answer to the warning it declines them; in the
+ * middle of measuring it is an abort, `GIB_ERR_ABORTED`.
  */
 #define GIB_TILT_INPUT_OFF 16
 
@@ -1813,7 +1815,7 @@ typedef struct gib_error_detail {
      */
     double value;
     /**
-     * Smallest value allowed.
+     * Smallest value allowed. Where no range applies both bounds are 0.
      */
     double low;
     /**
@@ -1903,7 +1905,8 @@ typedef struct gib_calibration_config {
      */
     double measure_s;
     /**
-     * Time in which the amplitude goes up or down, 0.01 to 10 s (default 0.5), five periods at least.
+     * Time in which the amplitude goes up or down, 0.01 to 10 s (default 0.5), five periods at least; turned round on its way up, a
+     * quarter more.
      */
     double ramp_s;
     /**
@@ -4486,7 +4489,7 @@ const char *gib_status_text(int32_t status);
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
  *
- * @return the size in bytes, about 110 KiB.
+ * @return the size in bytes, about 106 KiB.
  *
  * [thread: any] [real-time: yes] [state: any]
  */
@@ -4697,7 +4700,7 @@ int32_t gib_backlash_last_error(const struct gib_backlash *handle,
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
  *
- * @return the size in bytes, about 30 KiB.
+ * @return the size in bytes, about 22 KiB.
  *
  * [thread: any] [real-time: yes] [state: any]
  */
@@ -5018,7 +5021,7 @@ const struct gib_api_table *gib_api(uint32_t version);
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
  *
- * @return the size in bytes, about 66 KiB.
+ * @return the size in bytes, about 67 KiB.
  *
  * [thread: any] [real-time: yes] [state: any]
  */
@@ -5291,7 +5294,7 @@ int32_t gib_inertia_last_error(const struct gib_inertia *handle,
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
  *
- * @return the size in bytes, about 80 KiB.
+ * @return the size in bytes, about 66 KiB.
  *
  * [thread: any] [real-time: yes] [state: any]
  */
@@ -6064,7 +6067,7 @@ int32_t gib_speed_variation_last_error(const struct gib_speed_variation *handle,
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
  *
- * @return the size in bytes, about 132 KiB.
+ * @return the size in bytes, about 131 KiB.
  *
  * [thread: any] [real-time: yes] [state: any]
  */
@@ -6294,7 +6297,7 @@ int32_t gib_tilt_two_point(const struct gib_tilt_table *table,
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
  *
- * @return the size in bytes, about 4 KiB.
+ * @return the size in bytes, about 6 KiB.
  *
  * [thread: any] [real-time: yes] [state: any]
  */

@@ -139,7 +139,8 @@ pub const GIB_ERR_SPEED_VARIATION_NONE: i32 = -403;
 pub const GIB_ERR_RECORDER_IN_USE: i32 = -1000;
 /// The name belongs to shared memory that is no recorder's, or to another user's.
 pub const GIB_ERR_RECORDER_FOREIGN: i32 = -1001;
-/// The name of a column is misspelled, has a unit that its signal cannot have, or stands twice; `value` is its number.
+/// The name of a column is misspelled, has a unit that its signal cannot have, or stands twice: `value` is its number, without a
+/// range. Or there is not one name a channel: `value` is how many there are, and the range how many there are to be.
 pub const GIB_ERR_RECORDER_COLUMN: i32 = -1002;
 /// A step gave another number of values than there are channels; no row was written.
 pub const GIB_ERR_RECORDER_COUNT: i32 = -1003;
@@ -264,7 +265,10 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_SPEED_VARIATION_NONE, "friction and cutting leave the motor nothing to vary the speed with\0"),
     (GIB_ERR_RECORDER_IN_USE, "another living process records under this name\0"),
     (GIB_ERR_RECORDER_FOREIGN, "the name belongs to shared memory that is no recorder's, or to another user\0"),
-    (GIB_ERR_RECORDER_COLUMN, "the name of a column is misspelled, in a wrong unit, or stands twice\0"),
+    (
+        GIB_ERR_RECORDER_COLUMN,
+        "the name of a column is misspelled, in a wrong unit, or stands twice, or there is not one a channel\0",
+    ),
     (GIB_ERR_RECORDER_COUNT, "a step gave another number of values than there are channels\0"),
     (GIB_ERR_VIBRATION_NOT_A_NUMBER, "an acceleration is no number; the plain scale is in force\0"),
     (GIB_ERR_VIBRATION_STUCK, "an acceleration is stuck; the plain scale is in force\0"),

@@ -16,6 +16,7 @@ fn program(example: &str) -> String {
     format!(
         "#include \"kernel.h\"\nstatic plant axis;\nstatic kernel k;\n\
          static gib_backlash_input axis_cycle(const gib_backlash_output *out) {{ k.out = *out; return kernel_sense(&k); }}\n\
+         static int refused(const gib_backlash *gib, int32_t status) {{ return !gib || status; }}\n\
          int main(void) {{\nplant_config c = plant_default();\nplant_init(&axis, &c);\nkernel_init(&k, &axis);\n{example}\n\
          gib_backlash_free(gib);\n\
          return status == GIB_DONE && report.mean.lost_motion_um > 52.0 && report.mean.lost_motion_um < 54.0 ? 0 : 1;\n}}\n"

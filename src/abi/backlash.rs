@@ -52,7 +52,7 @@ fn refusable(handle: &mut GibBacklash, call: impl FnOnce(&mut Backlash) -> Resul
 
 /// Bytes that an instance needs in memory of your own, to be aligned to 16.
 ///
-/// @return the size in bytes, about 110 KiB.
+/// @return the size in bytes, about 106 KiB.
 ///
 /// [thread: any] [real-time: yes] [state: any]
 #[unsafe(no_mangle)]

@@ -36,7 +36,7 @@ impl super::guard::Instance for GibLearning {
 
 /// Bytes that an instance needs in memory of your own, to be aligned to 16.
 ///
-/// @return the size in bytes, about 80 KiB.
+/// @return the size in bytes, about 66 KiB.
 ///
 /// [thread: any] [real-time: yes] [state: any]
 #[unsafe(no_mangle)]

@@ -45,7 +45,7 @@ fn refusable(handle: &mut GibTilt, call: impl FnOnce(&mut Tilt) -> Result<(), Fa
 
 /// Bytes that an instance needs in memory of your own, to be aligned to 16.
 ///
-/// @return the size in bytes, about 132 KiB.
+/// @return the size in bytes, about 131 KiB.
 ///
 /// [thread: any] [real-time: yes] [state: any]
 #[unsafe(no_mangle)]

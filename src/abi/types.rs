@@ -15,7 +15,7 @@ pub struct GibErrorDetail {
     pub field: *const c_char,
     /// The value found.
     pub value: f64,
-    /// Smallest value allowed.
+    /// Smallest value allowed. Where no range applies both bounds are 0.
     pub low: f64,
     /// Largest value allowed.
     pub high: f64,

@@ -193,6 +193,12 @@ impl Calibration {
             }
             return;
         }
+        self.work(input);
+    }
+
+    /// A cycle of a calibration; out of line, since an idle one should not pay for its registers.
+    #[inline(never)]
+    fn work(&mut self, input: &CalibrationInput) {
         if self.phase == Phase::Begin && input.position_mm.is_finite() {
             self.start = input.position_mm;
             self.output.target_position_mm = input.position_mm;

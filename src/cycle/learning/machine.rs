@@ -243,6 +243,9 @@ impl Learning {
         if self.phase == Phase::Idle && self.idle(input, output) {
             return GIB_OK;
         }
+        if let Some(status) = self.quick_steep(input, output) {
+            return status;
+        }
         self.careful(input, output)
     }
 
@@ -250,7 +253,7 @@ impl Learning {
     #[inline(never)]
     fn careful(&mut self, input: &LearningInput, output: &mut LearningOutput) -> i32 {
         if self.turn_over(input.angle_deg) {
-            if let Some(status) = self.quick(input, output) {
+            if let Some(status) = self.quick(input, output).or_else(|| self.quick_steep(input, output)) {
                 return status;
             }
         }

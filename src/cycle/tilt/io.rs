@@ -23,7 +23,8 @@ pub const GIB_TILT_FAILED: i32 = 8;
 pub const GIB_TILT_INPUT_CUTTING: u32 = 4;
 /// Input flag: the path to be measured is finished.
 pub const GIB_TILT_INPUT_END: u32 = 8;
-/// Input flag: take the offsets out; the family then ends well.
+/// Input flag: take the offsets out; the family then ends well. In answer to the warning it declines them; in the
+/// middle of measuring it is an abort, `GIB_ERR_ABORTED`.
 pub const GIB_TILT_INPUT_OFF: u32 = 16;
 
 /// What the kernel tells gib in a cycle.

@@ -88,13 +88,7 @@ fn check(wanted: &Wanted) -> Result<(), Fault> {
 /// One name a channel, each of the recording's format or outside it, none twice.
 fn columns(text: &str, channels: usize) -> Result<(), Fault> {
     let names: Vec<&str> = text.split(',').collect();
-    let wrong = |at: usize| Fault {
-        code: GIB_ERR_RECORDER_COLUMN,
-        field: "columns\0",
-        value: at as f64 + 1.0,
-        low: channels as f64,
-        high: channels as f64,
-    };
+    let wrong = |at: usize| Fault { field: "columns\0", value: at as f64 + 1.0, ..Fault::of(GIB_ERR_RECORDER_COLUMN) };
     for (at, name) in names.iter().enumerate() {
         let fit = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
         let spelled = !name.is_empty() && name.chars().all(fit);
@@ -103,7 +97,9 @@ fn columns(text: &str, channels: usize) -> Result<(), Fault> {
             return Err(wrong(at));
         }
     }
-    if names.len() == channels { Ok(()) } else { Err(wrong(names.len())) }
+    let (value, wanted) = (names.len() as f64, channels as f64);
+    let count = Fault { code: GIB_ERR_RECORDER_COLUMN, field: "columns\0", value, low: wanted, high: wanted };
+    if names.len() == channels { Ok(()) } else { Err(count) }
 }
 
 const FLAGS: OFlags = OFlags::RDWR.union(OFlags::CLOEXEC).union(OFlags::NOFOLLOW);

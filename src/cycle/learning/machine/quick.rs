@@ -23,14 +23,16 @@ pub enum Kind {
     Kept,
     /// And the deviation is measured.
     Measured,
+    /// As `Kept`, of a correction so steep for this speed that each cycle asks how much it changes.
+    SteepKept,
+    /// As `Measured`, in the same way.
+    SteepMeasured,
 }
 
 /// What a usual cycle needs. Angles in points behind the first, not wrapped.
 #[derive(Debug, Clone, Copy)]
 pub struct Usual {
     kind: Kind,
-    /// Whether the correction is so steep for this speed that each cycle asks how much it changes.
-    steep: bool,
     /// Cycles more that can be usual, of how many.
     left: u32,
     granted: u32,
@@ -51,7 +53,6 @@ impl Usual {
     /// No usual cycles.
     pub const NONE: Usual = Usual {
         kind: Kind::None,
-        steep: false,
         left: 0,
         granted: 0,
         next: 0.0,
@@ -100,8 +101,12 @@ impl Learning {
         }
         let (pace, granted) = (self.rate * self.plan.scale, cycles.min(MOST) as u32);
         self.usual = Usual {
-            kind: if self.phase == Phase::Measure { Kind::Measured } else { Kind::Kept },
-            steep: change + behind > self.plan.slope,
+            kind: match (self.phase == Phase::Measure, change + behind > self.plan.slope) {
+                (false, false) => Kind::Kept,
+                (true, false) => Kind::Measured,
+                (false, true) => Kind::SteepKept,
+                (true, true) => Kind::SteepMeasured,
+            },
             left: granted,
             granted,
             next: at + pace,
@@ -131,12 +136,20 @@ impl Learning {
     /// Does this cycle if it is a usual one, and returns its status; else none with nothing changed.
     #[inline(always)]
     pub(super) fn quick(&mut self, input: &LearningInput, output: &mut LearningOutput) -> Option<i32> {
-        match (self.usual.kind, self.usual.steep) {
-            (Kind::Measured, false) => self.quick_as::<true, false>(input, output),
-            (Kind::Measured, true) => self.quick_as::<true, true>(input, output),
-            (Kind::Kept, false) => self.quick_as::<false, false>(input, output),
-            (Kind::Kept, true) => self.quick_as::<false, true>(input, output),
-            (Kind::None, _) => None,
+        match self.usual.kind {
+            Kind::Measured => self.quick_as::<true, false>(input, output),
+            Kind::Kept => self.quick_as::<false, false>(input, output),
+            _ => None,
+        }
+    }
+
+    /// The same where the correction is steep; apart, so that the others need not ask.
+    #[inline(always)]
+    pub(super) fn quick_steep(&mut self, input: &LearningInput, output: &mut LearningOutput) -> Option<i32> {
+        match self.usual.kind {
+            Kind::SteepMeasured => self.quick_as::<true, true>(input, output),
+            Kind::SteepKept => self.quick_as::<false, true>(input, output),
+            _ => None,
         }
     }
 
