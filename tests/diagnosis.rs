@@ -1,7 +1,7 @@
 //! The diagnosis on motions and torques written down as formulas (no simulation, no code of the product), and on measured
 //! data where they are at hand.
 
-use gib::diagnosis::{Diagnosis, Stopped, Verdict, diagnose};
+use gib::diagnosis::{Diagnosis, Excerpt, Stopped, Verdict, diagnose};
 use gib::machine::{Axis, Cause, Effect, Machine};
 use gib::recording::{Column, Recording};
 use std::f64::consts::TAU;
@@ -47,7 +47,11 @@ fn recording(extra: impl Fn(f64, f64, f64, f64) -> f64) -> Recording {
 }
 
 fn judged(recording: &Recording) -> Diagnosis {
-    diagnose(&axis(), recording, None, &|_, _| true).unwrap()
+    judged_by(&axis(), recording)
+}
+
+fn judged_by(axis: &Axis, recording: &Recording) -> Diagnosis {
+    diagnose(axis, &Excerpt::of(recording, axis), None, &|_, _| true).unwrap()
 }
 
 /// The cause is named alone, and each parameter is within `tolerance` of the truth, relative.
@@ -310,7 +314,8 @@ fn noise_of_a_filtered_current_is_no_discrepancy_and_a_wandering_one_is() {
 #[test]
 fn what_the_hold_out_contradicts_is_not_named() {
     let (more, as_believed) = (recording(|_, _, v, _| 0.3 * v.signum()), recording(|_, _, _, _| 0.0));
-    let with = |holdout: &Recording| diagnose(&axis(), &more, Some(holdout), &|_, _| true).unwrap();
+    let excerpt = |recording| Excerpt::of(recording, &axis());
+    let with = |holdout| diagnose(&axis(), &excerpt(&more), Some(&excerpt(holdout)), &|_, _| true).unwrap();
     assert_eq!(with(&more).verdict, Verdict::Explained);
     let d = with(&as_believed);
     assert_eq!((d.verdict, d.findings.len(), d.extended), (Verdict::UnknownCause, 0, axis()));
@@ -334,7 +339,8 @@ fn too_little_data_is_said_with_what_is_missing() {
 
 #[test]
 fn it_stops_when_told_to() {
-    let stopped = diagnose(&axis(), &recording(|_, _, v, _| 0.1 * v.signum()), None, &|_, _| false);
+    let excerpt = Excerpt::of(&recording(|_, _, v, _| 0.1 * v.signum()), &axis());
+    let stopped = diagnose(&axis(), &excerpt, None, &|_, _| false);
     assert_eq!(stopped.err(), Some(Stopped));
 }
 
@@ -345,7 +351,7 @@ fn an_extended_machine_survives_its_file_and_answers_no_discrepancy() {
     let mut machine = Machine::parse(MACHINE).unwrap();
     machine.axes[0] = d.extended;
     let again = Machine::parse(&machine.to_json().to_string()).unwrap();
-    assert_eq!(diagnose(&again.axes[0], &r, None, &|_, _| true).unwrap().verdict, Verdict::NoDiscrepancy);
+    assert_eq!(judged_by(&again.axes[0], &r).verdict, Verdict::NoDiscrepancy);
 }
 
 fn data(path: &str) -> Option<PathBuf> {
@@ -365,7 +371,7 @@ fn the_clean_rig_is_clean() {
         return;
     };
     let axis = Machine::load(&machine).unwrap().axes.remove(0);
-    let d = diagnose(&axis, &Recording::open(&recording).unwrap(), None, &|_, _| true).unwrap();
+    let d = judged_by(&axis, &Recording::open(&recording).unwrap());
     assert_eq!(d.verdict, Verdict::NoDiscrepancy, "{:?}", d.findings);
 }
 
@@ -373,7 +379,7 @@ fn the_clean_rig_is_clean() {
 fn emps_shows_timing_direction_dip_and_ripple_and_not_what_it_has_not() {
     let (Some(machine), Some(recording)) = (data("emps/machine.json"), data("emps/emps.csv")) else { return };
     let axis = Machine::load(&machine).unwrap().axes.remove(0);
-    let d = diagnose(&axis, &Recording::open(&recording).unwrap(), None, &|_, _| true).unwrap();
+    let d = judged_by(&axis, &Recording::open(&recording).unwrap());
     let of = |cause: Cause| d.findings.iter().find(|f| f.effect.cause() == cause).map(|f| f.effect.values());
     let delay = of(Cause::DeadTime).unwrap()[0];
     assert!((-1.6..-0.3).contains(&delay), "{delay}");

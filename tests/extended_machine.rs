@@ -4,7 +4,7 @@
 use gib::diagnosis::causes::LAWS;
 use gib::diagnosis::experiment::telling;
 use gib::diagnosis::frame::{Columns, Frame};
-use gib::diagnosis::{Diagnosis, Verdict, diagnose};
+use gib::diagnosis::{Diagnosis, Excerpt, Verdict, diagnose};
 use gib::machine::{Axis, Cause, Effect, Machine, Servo};
 use gib::plant::closed_loop::predict;
 use gib::plant::motion::smoothed;
@@ -62,7 +62,7 @@ fn test_moves() -> Moves {
 }
 
 fn judged(axis: &Axis, recording: &Recording) -> Diagnosis {
-    diagnose(axis, recording, None, &|_, _| true).unwrap()
+    diagnose(axis, &Excerpt::of(recording, axis), None, &|_, _| true).unwrap()
 }
 
 fn named(d: &Diagnosis) -> Vec<Cause> {

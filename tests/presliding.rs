@@ -1,7 +1,7 @@
 //! Friction that builds up after a reversal, by formulations that are written down here and stepped finely along a formula's
 //! motion: each is found under its name, and at its own stiffness.
 
-use gib::diagnosis::{Verdict, diagnose};
+use gib::diagnosis::{Excerpt, Verdict, diagnose};
 use gib::machine::{Axis, Cause, Effect, Machine};
 use gib::recording::{Column, Recording};
 use std::f64::consts::{PI, TAU};
@@ -87,7 +87,7 @@ fn recording(mut friction: impl FnMut(f64) -> f64) -> Recording {
 /// The effect that is found, which is alone, holds the true displacement in its 95 % and is within `tolerance` of it.
 fn found(tolerance: f64, friction: impl FnMut(f64) -> f64) -> Effect {
     let axis: Axis = Machine::parse(MACHINE).unwrap().axes.remove(0);
-    let d = diagnose(&axis, &recording(friction), None, &|_, _| true).unwrap();
+    let d = diagnose(&axis, &Excerpt::of(&recording(friction), &axis), None, &|_, _| true).unwrap();
     let named: Vec<Cause> = d.findings.iter().map(|f| f.effect.cause()).collect();
     assert_eq!((d.verdict, named.as_slice()), (Verdict::Explained, &[Cause::PreslidingFriction][..]), "{d:?}");
     let (value, deviation) = (d.findings[0].effect.values()[0] * 1e-3, d.findings[0].deviations[0] * 1e-3);

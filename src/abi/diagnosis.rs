@@ -3,7 +3,7 @@
 use super::guard::{CONFIG, Instance, guarded, instance, versioned};
 use super::machine::{GibMachine, file_status};
 use super::text::{copy_out, path_if_any, path_of, text_if_any};
-use crate::diagnosis::{Diagnosis, Verdict, axis_of, diagnose, usable};
+use crate::diagnosis::{Diagnosis, Excerpt, Verdict, axis_of, diagnose};
 use crate::error::{
     Fault, GIB_DONE, GIB_ERR_ABORTED, GIB_ERR_DIAGNOSIS_AXIS, GIB_ERR_DIAGNOSIS_HOLDOUT, GIB_ERR_NULL, GIB_ERR_STATE,
     GIB_ERR_STRUCT_SIZE, GIB_OK,
@@ -100,8 +100,8 @@ struct Task {
     machine: Machine,
     /// Number of the axis in the machine.
     axis: usize,
-    recording: Recording,
-    holdout: Option<Recording>,
+    recording: Excerpt,
+    holdout: Option<Excerpt>,
 }
 
 impl Instance for GibDiagnosis {
@@ -138,12 +138,16 @@ impl Task {
     ) -> Result<Task, (i32, String)> {
         let open = |path: &Path| Recording::open(path).map_err(|why| (file_status(path), why.to_string()));
         let recording = open(recording)?;
-        let axis = axis_of(machine, &recording, axis).map_err(|why| (GIB_ERR_DIAGNOSIS_AXIS, why))?;
-        let holdout = holdout.map(open).transpose()?;
-        if let (Some(holdout), Some(axis)) = (&holdout, machine.axes.get(axis)) {
-            usable(holdout, axis).map_err(|why| (GIB_ERR_DIAGNOSIS_HOLDOUT, why.to_string()))?;
+        let number = axis_of(machine, &recording, axis).map_err(|why| (GIB_ERR_DIAGNOSIS_AXIS, why))?;
+        let axis = machine.axes.get(number).ok_or_else(|| (GIB_ERR_DIAGNOSIS_AXIS, String::new()))?;
+        // One after the other, so that there is room for either.
+        let excerpt = Excerpt::of(&recording, axis);
+        drop(recording);
+        let holdout = holdout.map(|file| open(file).map(|read| Excerpt::of(&read, axis))).transpose()?;
+        if let Some(Err(why)) = holdout.as_ref().map(Excerpt::usable) {
+            return Err((GIB_ERR_DIAGNOSIS_HOLDOUT, why.to_string()));
         }
-        Ok(Task { machine: machine.clone(), axis, recording, holdout })
+        Ok(Task { machine: machine.clone(), axis: number, recording: excerpt, holdout })
     }
 }
 

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use gib::diagnosis::{Diagnosis, Left, Verdict, axis_of, diagnose};
+use gib::diagnosis::{Diagnosis, Excerpt, Left, Verdict, axis_of, diagnose};
 use gib::recording::Recording;
 
 use super::table::Table;
@@ -52,15 +52,18 @@ impl Diagnose {
     pub fn run(&self) -> Result {
         let mut machine = machine_file::load(&self.machine)?;
         let recording = Recording::open(&self.recording)?;
-        let holdout = self.holdout.as_deref().map(Recording::open).transpose()?;
         let chosen = axis_of(&machine, &recording, self.axis.as_deref())?;
         let axis = &mut machine.axes[chosen];
-        if let Some(holdout) = &holdout {
-            gib::diagnosis::usable(holdout, axis)?;
+        // One after the other, so that there is room for either.
+        let excerpt = Excerpt::of(&recording, axis);
+        drop(recording);
+        let holdout = self.holdout.as_deref().map(|file| Recording::open(file).map(|read| Excerpt::of(&read, axis)));
+        let holdout = holdout.transpose()?;
+        if let Some(Err(why)) = holdout.as_ref().map(Excerpt::usable) {
+            return Err(why.clone().into());
         }
         let meter = Meter::new(self.progress);
-        let Ok(diagnosis) = diagnose(axis, &recording, holdout.as_ref(), &|share, stage| meter.show(share, stage))
-        else {
+        let Ok(diagnosis) = diagnose(axis, &excerpt, holdout.as_ref(), &|share, stage| meter.show(share, stage)) else {
             return Err("stopped".into());
         };
         meter.clear();

@@ -6,13 +6,13 @@ use crate::machine::Axis;
 use crate::plant::observed::Observed;
 use crate::plant::stamps::are_even;
 use crate::plant::stretches::{Stretch, fill_between, fill_smooth, fill_straight, holes, joined, without_long_holes};
-use crate::recording::{Column, IssueKind, Recording, RecordingError, Signal, Unit};
+use crate::recording::{Column, Recording, RecordingError, Signal, Unit};
 use std::ops::Range;
 
 /// Most rows that are worked on; of longer recordings, evenly spread stretches.
 const MOST_ROWS: usize = 480_000;
 /// Stretches that a longer recording is cut to.
-const PIECES: usize = 48;
+pub(super) const PIECES: usize = 48;
 /// Rows are averaged until there are no more than this many a second: the friction, ripple and resonance of a machine tool's
 /// axis lie well below half of it, and what is above it is the current loop's.
 const ROWS_A_SECOND: f64 = 1000.0;
@@ -165,24 +165,15 @@ impl Columns {
         }
     }
 
-    /// What a reader must know of the rows of a recording that are not among these, or not as they were recorded.
-    pub(super) fn notes(&self, recording: &Recording, axis: &Axis) -> Vec<String> {
-        let (used, all) = (self.time_s.len(), self.time_s.len() + self.left_out);
-        let text = || {
-            format!("{all} rows are more than are worked on: {used} of them were, in {PIECES} evenly spread stretches")
-        };
-        let mut notes: Vec<String> = if self.left_out > 0 { vec![text()] } else { Vec::new() };
-        notes.extend(amiss(recording, axis));
-        notes
-    }
-
-    /// The same columns as the simulation sees a recording; `None` where no stretch is long enough for a motion.
+    /// The same columns as the simulation sees a recording; `None` where no stretch is long enough for a motion. Without the command
+    /// where rows were left out: no loop can be replayed where what the axis did in between is not at hand.
     #[must_use]
     pub fn observed(&self) -> Option<Observed> {
         let mut copy = Columns::clone(self);
         let rows = copy.torque.iter_mut().zip(&self.known);
         rows.filter(|(_, known)| !**known).for_each(|(torque, _)| *torque = f64::NAN);
-        Observed::from_columns(copy.time_s, copy.position, copy.torque, copy.command, copy.table, copy.stretches)
+        let command = copy.command.filter(|_| self.left_out == 0);
+        Observed::from_columns(copy.time_s, copy.position, copy.torque, command, copy.table, copy.stretches)
     }
 
     /// Of how many recorded rows one is the mean; its error is the mean of theirs.
@@ -236,29 +227,6 @@ impl Columns {
             ..self
         }
     }
-}
-
-/// What is amiss with the rows of an axis's columns, what became of them, and what to do.
-fn amiss<'r>(recording: &'r Recording, axis: &'r Axis) -> impl Iterator<Item = String> + 'r {
-    let read = |name: &str| {
-        let label = recording.columns.iter().find(|c| c.name == name).and_then(|c| c.label.as_ref());
-        use Signal::{Force, Position, PositionCommand, TablePosition, Torque};
-        let signals = [Position, PositionCommand, TablePosition, Torque, Force];
-        name == "time_s" || label.is_some_and(|l| l.channel == axis.name && signals.contains(&l.signal))
-    };
-    let concerned = recording.issues.iter().filter(move |issue| issue.column.as_deref().is_none_or(read));
-    concerned.filter_map(|issue| {
-        let what_to_do = match issue.kind {
-            IssueKind::RepeatedTime => "write times with more decimals",
-            IssueKind::Gap => "what lies between gaps is judged; record every row if much is missing",
-            IssueKind::IrregularSampling => "rows are taken as even where the motion is smoother so, else interpolated to even steps; record one a servo cycle",
-            IssueKind::NotFinite => "the rows around them are judged; record again if they are many",
-            IssueKind::Jump | IssueKind::Outlier => "look at encoder and cable if it happens again",
-            IssueKind::Wrap => "nothing need be done",
-            IssueKind::WrongUnit | IssueKind::UnknownColumn => return None,
-        };
-        Some(format!("{issue}: {what_to_do}"))
-    })
 }
 
 /// All runs, or evenly spread pieces of them where they are too long together.
@@ -335,6 +303,28 @@ mod tests {
         let step = undithered_step(&with_noise(0.0));
         assert!((step * 12.0 - 1.0).abs() < 1e-3, "{step}");
         assert_eq!(undithered_step(&with_noise(0.3)), 0.0);
+    }
+
+    #[test]
+    fn no_loop_is_replayed_across_rows_that_were_left_out() {
+        let rows: Vec<f64> = (0..4000).map(|i| f64::from(i) * 1e-3).collect();
+        let whole = Columns {
+            time_s: rows.clone(),
+            position: rows.clone(),
+            torque: rows.clone(),
+            known: vec![true; rows.len()],
+            command: Some(rows),
+            table: None,
+            stretches: vec![0..2000, 2000..4000],
+            torque_step: 0.0,
+            position_grid: 0.0,
+            table_grid: 0.0,
+            period_s: 1e-3,
+            recorded_period_s: 1e-3,
+            left_out: 0,
+        };
+        assert!(whole.observed().unwrap().command.is_some());
+        assert!(Columns { left_out: 1, ..whole }.observed().unwrap().command.is_none());
     }
 
     #[test]

@@ -93,8 +93,9 @@ pub struct Holdout {
 impl Holdout {
     /// Of every row; `None` where no stretch is long enough for a motion.
     #[must_use]
-    pub fn new(axis: &Axis, columns: Columns) -> Option<Self> {
-        let (observed, base, thinned) = (columns.observed()?, belief::base_alone(axis), columns.thinned());
+    pub fn new(axis: &Axis, columns: &Columns) -> Option<Self> {
+        let (observed, base) = (columns.observed()?, belief::base_alone(axis));
+        let thinned = columns.clone().thinned();
         let weight = weight_of_rows(&Frame::new(&base, &thinned, None), &observed.time_s);
         Some(Self { observed, weight })
     }
@@ -128,11 +129,7 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
     /// Of every row of the recording.
     #[must_use]
     pub fn new([axis, kept]: [&'g Axis; 2], columns: &Columns, bench: &'g Bench<'f, 'a>, watch: &'g Watch<'g>) -> Self {
-        let mut observed = columns.observed();
-        if let Some(observed) = observed.as_mut().filter(|_| columns.left_out > 0) {
-            // What the axis did in between is not at hand, so that no loop can be replayed.
-            observed.command = None;
-        }
+        let observed = columns.observed();
         let half = observed.as_ref().map_or_else(Vec::new, |observed| half_of_rows(bench, &observed.time_s));
         let weight = observed.as_ref().map_or_else(Vec::new, |observed| weight_of_rows(bench.frame, &observed.time_s));
         let observed = observed.map(|observed| {

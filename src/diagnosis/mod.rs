@@ -15,6 +15,7 @@ pub mod causes;
 mod choice;
 mod columns;
 mod contact;
+mod excerpt;
 pub mod experiment;
 pub mod filter;
 pub mod fit;
@@ -41,6 +42,7 @@ pub mod uncertainty;
 pub mod verdict;
 
 pub use choice::axis_of;
+pub use excerpt::Excerpt;
 pub use progress::{Progress, Stopped};
 pub use show::{Coordinate, View};
-pub use verdict::{Diagnosis, Finding, Left, Unexplained, Verdict, diagnose, usable};
+pub use verdict::{Diagnosis, Finding, Left, Unexplained, Verdict, diagnose};

@@ -4,6 +4,7 @@
 
 use super::belief;
 use super::causes::{LAWS, Law, law};
+use super::excerpt::Excerpt;
 use super::experiment;
 use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
@@ -18,7 +19,6 @@ use super::select::{Search, Selection};
 use super::show::{self, View};
 use super::uncertainty::{self, Sure};
 use crate::machine::{Axis, Cause, Effect};
-use crate::recording::{Recording, RecordingError};
 
 /// Judged time below which nothing is said, s, and judged rows.
 const LEAST_SECONDS: f64 = 1.0;
@@ -115,17 +115,16 @@ pub struct Diagnosis {
 /// [`Stopped`] when `progress` answers false.
 pub fn diagnose(
     axis: &Axis,
-    recording: &Recording,
-    holdout: Option<&Recording>,
+    recording: &Excerpt,
+    holdout: Option<&Excerpt>,
     progress: Progress,
 ) -> Result<Diagnosis, Stopped> {
     let watch = Watch::new(progress);
     watch.at(0.0, "reading the motion")?;
-    let whole = match Columns::of(recording, axis) {
-        Ok(columns) => columns,
+    let (whole, notes) = match &recording.columns {
+        Ok(columns) => (columns, recording.notes.clone()),
         Err(why) => return Ok(insufficient(axis, vec![why.to_string()])),
     };
-    let notes = whole.notes(recording, axis);
     let masses = match axis.two_masses() {
         Ok(masses) => masses,
         Err(why) => return Ok(insufficient(axis, vec![format!("a machine file that holds together: {why}")])),
@@ -142,7 +141,7 @@ pub fn diagnose(
         return Ok(Diagnosis { notes, ..insufficient(axis, missing) });
     }
     watch.at(0.05, "reading the motion")?;
-    let recorded = Recorded { axis, belief: axis, whole: &whole, holdout, watch: &watch };
+    let recorded = Recorded { axis, belief: axis, whole, holdout, watch: &watch };
     answer(&recorded, &frame, notes)
 }
 
@@ -152,7 +151,7 @@ struct Recorded<'d> {
     /// What of the axis is taken for granted.
     belief: &'d Axis,
     whole: &'d Columns,
-    holdout: Option<&'d Recording>,
+    holdout: Option<&'d Excerpt>,
     watch: &'d Watch<'d>,
 }
 
@@ -226,10 +225,10 @@ fn answer_on(
     let mut findings = findings(belief, bench, &judged.selection, sure.as_ref(), &empty);
     let mut extended = extended_by(belief, &findings);
     if let Some(holdout) = holdout {
-        match Columns::of(holdout, axis).map(|columns| (columns.notes(holdout, axis), Holdout::new(axis, columns))) {
-            Ok((note, Some(holdout))) => {
-                notes.extend(note.iter().map(|note| format!("hold-out: {note}")));
-                let [gains, in_judged_rows] = gain::on_holdout(axis, &extended, &holdout, watch)?;
+        match holdout.columns.as_ref().map(|columns| Holdout::new(axis, columns)) {
+            Ok(Some(rows)) => {
+                notes.extend(holdout.notes.iter().map(|note| format!("hold-out: {note}")));
+                let [gains, in_judged_rows] = gain::on_holdout(axis, &extended, &rows, watch)?;
                 judged.gains = gains;
                 let effects: Vec<Effect> = findings.iter().map(|f| f.effect).collect();
                 if shows(&in_judged_rows) && refuted(&in_judged_rows, &effects) {
@@ -237,7 +236,7 @@ fn answer_on(
                     notes.push(refutation(causes, &in_judged_rows, "the hold-out"));
                     judged = judge.nothing(&judged.selection);
                     (findings, extended) = (Vec::new(), axis.clone());
-                    [judged.gains, _] = gain::on_holdout(axis, axis, &holdout, watch)?;
+                    [judged.gains, _] = gain::on_holdout(axis, axis, &rows, watch)?;
                 }
             }
             why => {
@@ -310,14 +309,6 @@ fn unexplained(bench: &Bench, fit: &Fit, shown: &[View], with_scale: bool) -> Un
 fn extended_by(axis: &Axis, findings: &[Finding]) -> Axis {
     let effects: Vec<Effect> = findings.iter().map(|f| f.effect).collect();
     belief::extended(axis, &effects)
-}
-
-/// Whether a recording has the columns that a diagnosis of this axis needs.
-///
-/// # Errors
-/// Position or torque (force) is missing or in a wrong unit.
-pub fn usable(recording: &Recording, axis: &Axis) -> Result<(), RecordingError> {
-    Columns::of(recording, axis).map(|_| ())
 }
 
 fn insufficient(axis: &Axis, missing: Vec<String>) -> Diagnosis {
