@@ -10,7 +10,7 @@ const BUFFER_BYTES: usize = 256 * 1024;
 /// Reads the time and all other columns, in file order.
 pub(super) fn read(source: impl Read, file: &str, length: u64) -> Result<(Vec<f64>, Vec<Column>), RecordingError> {
     let mut source = BufReader::with_capacity(BUFFER_BYTES, source);
-    skip_byte_order_mark(&mut source, file)?;
+    begin_text(&mut source, file)?;
     let mut reader =
         ::csv::ReaderBuilder::new().has_headers(false).flexible(true).buffer_capacity(BUFFER_BYTES).from_reader(source);
     let mut record = ::csv::ByteRecord::new();
@@ -48,9 +48,22 @@ pub(super) fn read(source: impl Read, file: &str, length: u64) -> Result<(Vec<f6
     Ok((time_s, columns.map(|(name, values)| Column::new(name, values)).collect()))
 }
 
+/// What often stands at the beginning of a file that is no plain text, and what to do with it.
+const NO_TEXT: [(&[u8], &str); 6] = [
+    (b"\x1F\x8B", "is compressed with gzip; unpack it first"),
+    (b"\x28\xB5\x2F\xFD", "is compressed with zstd; unpack it first"),
+    (b"PK\x03\x04", "is an archive or a spreadsheet; unpack it, or export it as CSV"),
+    (b"\xFF\xFE", "is text in UTF-16; save it as UTF-8"),
+    (b"\xFE\xFF", "is text in UTF-16; save it as UTF-8"),
+    (b"PAR1", "is Parquet; name it .parquet"),
+];
+
 /// Programs on Windows write three bytes before the header that are no part of it.
-fn skip_byte_order_mark(source: &mut impl BufRead, file: &str) -> Result<(), RecordingError> {
+fn begin_text(source: &mut impl BufRead, file: &str) -> Result<(), RecordingError> {
     let start = source.fill_buf().map_err(|why| RecordingError::new(file, format!("cannot be read: {why}")))?;
+    if let Some((_, message)) = NO_TEXT.iter().find(|(bytes, _)| start.starts_with(bytes)) {
+        return Err(RecordingError::new(file, *message));
+    }
     if start.starts_with(b"\xEF\xBB\xBF") {
         source.consume(3);
     }
@@ -134,6 +147,17 @@ mod tests {
         assert!(recording.columns[0].values[2].is_nan());
         assert_eq!(recording.columns[1].values[0], 2.0);
         assert!(recording.columns[1].values[1].is_nan() && recording.columns[1].values[2].is_nan());
+    }
+
+    #[test]
+    fn what_is_no_text_is_said_to_be_none() {
+        let utf16: Vec<u8> = "\u{feff}time_s".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        for (bytes, told) in
+            [(utf16.as_slice(), "UTF-8"), (b"\x1F\x8B\x08", "gzip"), (b"PK\x03\x04", "export it as CSV")]
+        {
+            let error = Recording::read_csv(bytes, "r.csv", 0).expect_err("must be refused").to_string();
+            assert!(error.contains(told), "{error}");
+        }
     }
 
     #[test]
