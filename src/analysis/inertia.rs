@@ -97,6 +97,11 @@ impl fmt::Display for Refusal {
                     100.0 * high
                 )
             }
+            "blocks_left_out_short_ratio" => write!(
+                f,
+                ": of the stretches left out as weakened or saturated {:.0} % show less torque than the others ask for, not more",
+                100.0 * value
+            ),
             "halves_apart_ratio" => {
                 write!(f, ": the two halves of the recording differ by {:.0} % of the inertia", 100.0 * value)
             }

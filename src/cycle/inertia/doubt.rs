@@ -12,6 +12,7 @@ pub fn doubt(blocks: &[Block], rows: &Rows, found: &Regression, balance: &Balanc
         .or_else(|| if balance.both_ways { dead(rows, found) } else { None })
         .or_else(|| torn(found))
         .or_else(|| halves(rows, found))
+        .or_else(|| denied(rows, found))
         // Of one pace the gentle part would be holds and corners.
         .or_else(|| if balance.one_acceleration { None } else { paces(rows, found) })
 }
@@ -58,6 +59,23 @@ fn torn(found: &Regression) -> Option<Fault> {
     }
     (found.in_a_row >= IN_A_ROW.0 && row > IN_A_ROW.1)
         .then(|| fault("blocks_dropped_in_a_row_ratio\0", row, IN_A_ROW.1))
+}
+
+/// Beyond what is called a weakened field or a saturation the motor gives less than is reported, never more. Where the blocks left out
+/// for that show less torque than the balance of the others asks for, that balance is wrong: what was left out was the motor as it is,
+/// and what was kept is something else, as a load that came on.
+fn denied(rows: &Rows, found: &Regression) -> Option<Fault> {
+    const CLEAR: f64 = 4.0; // standard deviations
+    const MOST: f64 = 0.15; // of what was left out, as of outliers
+    let left_out = || rows.blocks.iter().filter(|b| !rows.counts(b));
+    let short = |block: &&Block| {
+        let motion = rows.row(block);
+        let expected = found.terms.dot(&motion);
+        let variance = found.scatter.powi(2) + found.variance.dot(&motion.component_mul(&motion));
+        (block.torque - expected) * expected.signum() < -CLEAR * variance.sqrt()
+    };
+    let share = left_out().filter(short).count() as f64 / left_out().count().max(1) as f64;
+    (share > MOST).then(|| fault("blocks_left_out_short_ratio\0", share, MOST))
 }
 
 /// The first and the second half of the motion each say clearly what the other denies.
@@ -164,6 +182,29 @@ mod tests {
             doubt(&blocks, &rows, &rows.fit().unwrap(), &balance).map(|fault| fault.field)
         };
         assert_eq!((doubted(true), doubted(false)), (None, Some("paces_apart_ratio\0")));
+    }
+
+    /// Beyond a limit a motor may be reported to give more than it does. Where a part of what is left out shows less, as where what was
+    /// kept is a load that came on, the balance is refused; that part may be as large as that of outliers, and no larger.
+    #[test]
+    fn what_is_left_out_shows_no_less_torque() {
+        const BEYOND: f64 = 15.0;
+        let denied_of = |short: usize, excess: f64| {
+            let block = |i: usize| {
+                let acceleration = [60.0, 24.0, -60.0, -24.0][i / 10 % 4];
+                let delivered = 0.3 * acceleration + 0.5 + 0.05 * (i as f64 * 2.7).sin();
+                let beyond = (delivered.abs() - BEYOND).max(0.0).copysign(delivered);
+                let share = if i % 20 < short { -0.5 } else { excess };
+                Block { torque: delivered + share * beyond, speed: 60.0 + (i % 10) as f64, acceleration }
+            };
+            let blocks: Vec<Block> = (0..160).map(block).collect();
+            let trusted = Limit { torque: BEYOND, ..Limit::none(Terms::new(0.3, 0.0, 0.5, 0.0, 0.0)) };
+            let rows = Rows { blocks: &blocks, both_senses: false, noise: 0.0, trusted, suspected: None };
+            denied(&rows, &rows.fit().unwrap()).map(|fault| (fault.code, fault.field, fault.value > fault.high))
+        };
+        let named = Some((GIB_ERR_INERTIA_TORQUE, "blocks_left_out_short_ratio\0", true));
+        assert_eq!([denied_of(0, 0.0), denied_of(0, 0.6), denied_of(0, 3.0), denied_of(1, 0.6)], [None; 4]);
+        assert_eq!([denied_of(3, 0.6), denied_of(10, 0.0)], [named; 2]);
     }
 
     #[test]

@@ -155,7 +155,8 @@ impl Rows<'_> {
     }
 
     /// The regressors of a block.
-    fn row(&self, block: &Block) -> Terms {
+    #[must_use]
+    pub fn row(&self, block: &Block) -> Terms {
         let mut row = self.motion(block);
         if let Some(limit) = &self.suspected {
             let (share, torque) = limit.beyond(&row);
