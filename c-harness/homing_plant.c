@@ -215,6 +215,9 @@ static void substep(homing_plant *p, homing_plant_side *s, int i, double torque_
          c->motor_inertia_nm_s2_mm, dt);
     move(&s->y, &s->vy, &s->table_sticks, drive - against, table_friction(c, friction, s->vy),
          c->breakaway_ratio * friction, c->table_inertia_nm_s2_mm, dt);
+    int meets = !s->touches && s->y >= c->stop_mm[i];
+    s->touched_mm = meets ? s->x : s->touched_mm;
+    s->touches = meets || (s->touches && s->y > c->stop_mm[i] - 0.02);
 }
 
 /* The servo of one side; `target` in mm toward the stop. */

@@ -73,6 +73,8 @@ typedef struct {
     int motor_sticks, table_sticks;
     double torque, integral, last_encoder, last_target;
     double crushed; /* of the chips */
+    int touches;    /* the table is on its stop, or has not been off it by more than 20 um since */
+    double touched_mm; /* where the motor was when it met its stop last */
     double slipped, frozen_at, stuck_at;
     uint32_t faults; /* of this side alone */
 } homing_plant_side;

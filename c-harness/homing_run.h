@@ -16,6 +16,7 @@ typedef struct {
     double most_travel_mm;    /* of the real table */
     double rest_torque_nm;    /* largest motor torque in a second after the end */
     double rest_way_mm;       /* way of the table in that second */
+    double touched_mm[2];     /* where each motor was when its table met the stop last, as the plant has it */
     double limit_nm;          /* limit in force at the end */
     uint32_t order[16];       /* events as they came */
     int events;
@@ -62,6 +63,8 @@ static inline homing_outcome homing_run(const homing_plant_config *c, const gib_
         }
     } while (status == GIB_BUSY && o.cycles < 2000000);
     o.status = status;
+    o.touched_mm[0] = p.side[0].touched_mm;
+    o.touched_mm[1] = p.side[1].touched_mm;
     o.most_torque_nm = p.most_torque_nm;
     o.most_travel_mm = p.most_travel_mm;
     gib_homing_result(gib, &o.report);

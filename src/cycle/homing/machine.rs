@@ -81,8 +81,6 @@ pub struct Homing {
     fitting: usize,
     fit: Fit,
     touches: [Touches; 2],
-    /// Gantry: how far apart its sides stood where both pressed last, mm.
-    pressed_apart: f64,
     /// On the way out: the commands have come to rest.
     stopped: bool,
     /// Torque limit in force at the start.
@@ -111,7 +109,6 @@ impl Default for Homing {
             fitting: 0,
             fit: Fit::default(),
             touches: [Touches::default(); 2],
-            pressed_apart: 0.0,
             stopped: false,
             old_limit: 0.0,
             in_force: 0,
@@ -359,7 +356,9 @@ impl Homing {
     #[cold]
     fn overdue(&mut self) {
         if self.now >= self.end {
-            return self.leave(Fault { code: GIB_ERR_HOMING_TIME_LIMIT, field: "time_limit_s\0", ..Fault::NONE });
+            let [value, high] = [self.now.saturating_add(1), self.end].map(|n| f64::from(n) / self.plan.cycles_per_s);
+            let (code, field) = (GIB_ERR_HOMING_TIME_LIMIT, "time_limit_s\0");
+            return self.leave(Fault { code, field, value, low: 0.0, high });
         }
         match self.phase {
             Phase::Limit | Phase::Clear | Phase::Set => {
@@ -368,9 +367,9 @@ impl Homing {
             }
             Phase::Offset => {
                 // The command has long ended.
-                let lag = Fault { field: "position_mm\0", ..Fault::of(GIB_ERR_LAG) };
-                let behind = self.sides.iter().take(self.plan.motors).find(|side| !side.came(&self.plan));
-                self.leave(behind.map_or(lag, |side| side.contradiction(&self.plan, lag)));
+                let late = |side: &&Side| side.profile.speed != 0.0 || !side.came(&self.plan);
+                let behind = self.sides.iter().take(self.plan.motors).find(late).unwrap_or(&self.sides[0]);
+                self.leave(behind.contradiction(&self.plan, behind.never_came(&self.plan)));
             }
             _ => self.leave(Fault { code: GIB_ERR_DEADLINE, field: "phase\0", ..Fault::NONE }),
         }

@@ -343,6 +343,13 @@ impl Side {
         self.settled(plan) || (self.light(plan) && (self.profile.position - self.position).abs() <= 0.5 * way)
     }
 
+    /// The fault of an axis that has not.
+    #[must_use]
+    pub fn never_came(&self, plan: &Plan) -> Fault {
+        let (value, high) = (self.profile.position - self.position, 0.1 * plan.press_max);
+        Fault { code: GIB_ERR_LAG, field: "position_mm\0", value, low: -high, high }
+    }
+
     /// Whether something is pressed on, or torque enough is on for it to be.
     #[must_use]
     pub fn pressing(&self, plan: &Plan) -> bool {

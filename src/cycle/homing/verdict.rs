@@ -75,6 +75,8 @@ pub struct Touches {
     /// Torque toward the stop while the axis slid back from it, once it did.
     slides_back: Option<f64>,
     threshold: f64,
+    /// Gantry: way by which the beam makes the contact point seem too early at most; too late where negative.
+    leans: f64,
     mean: Contact,
 }
 
@@ -85,13 +87,15 @@ impl Touches {
     /// # Errors
     /// `GIB_ERR_HOMING_SHAPE`, `GIB_ERR_HOMING_SOFT_STOP`, `GIB_ERR_HOMING_NOISE`.
     pub fn add(&mut self, plan: &Plan, touch: u32, fit: &Fit, offset: f64) -> Result<(), Fault> {
-        let soft = Fault { field: "press_max_mm\0", high: plan.press_max, ..Fault::of(GIB_ERR_HOMING_SOFT_STOP) };
-        let fault = if fit.rises_early() { soft } else { Fault::of(GIB_ERR_HOMING_SHAPE) };
-        match fit.found() {
-            Some(contact) => self.keep(plan, touch, contact, offset),
+        match (fit.found(), fit.rises_early()) {
+            (Ok(contact), _) => self.keep(plan, touch, contact, offset),
             // A fast approach leaves too few points for a line; the measured touches are slower.
-            None if touch == 0 && plan.approach > plan.touch && !fit.rises_early() => Ok(()),
-            None => Err(fault),
+            (Err(_), None) if touch == 0 && plan.approach > plan.touch => Ok(()),
+            (Err(shape), None) => Err(shape),
+            (Err(_), Some(rise)) => {
+                let [value, high] = rise.map(|slope| slope * plan.torque_nm);
+                Err(Fault { code: GIB_ERR_HOMING_SOFT_STOP, field: "early_rise_nm_mm\0", value, low: 0.0, high })
+            }
         }
     }
 
@@ -125,6 +129,7 @@ impl Touches {
         self.least = self.least.min(way);
         self.most = self.most.max(way);
         self.threshold += contact.threshold_way + offset;
+        self.mean.way += contact.way;
         self.mean.press += contact.press;
         self.mean.stiffness += contact.stiffness;
         self.mean.level += contact.level;
@@ -135,10 +140,28 @@ impl Touches {
         Ok(())
     }
 
-    /// Way to the contact point, mean of the measured touches.
+    /// Way to the contact point, mean of the measured touches. What the beam makes of it is anything up to its most: half of that is
+    /// likeliest.
     #[must_use]
     pub fn contact(&self) -> f64 {
-        self.first + self.sum / self.n.max(1.0)
+        self.first + self.sum / self.n.max(1.0) + 0.5 * self.leans
+    }
+
+    /// Takes note of a force of the beam, toward the stop where negative, that grows while one side of a gantry touches alone.
+    pub fn lean(&mut self, force: f64) {
+        self.leans = force / self.stiffness().max(f64::MIN_POSITIVE);
+    }
+
+    /// Way from where a touch begins to the contact point, mean of the measured touches.
+    #[must_use]
+    pub fn run_up(&self) -> f64 {
+        self.mean.way / self.n.max(1.0)
+    }
+
+    /// By how much the torque before contact has changed since the first touch, where that gave a contact point.
+    #[must_use]
+    pub fn racked_by(&self) -> Option<f64> {
+        self.coarse.then(|| self.level() - self.first_level)
     }
 
     /// Way to where the limit was reached.
@@ -194,7 +217,9 @@ impl Touches {
         let press = self.mean.press / n;
         let short = (press - press * press / (LINE_S * plan.cycles_per_s * plan.touch)).max(0.0);
         let bend = BENT * self.bend();
-        let shared = [impact, swing, friction, short, bend].iter().fold(0.0, |sum, part| sum + part * part);
+        // Even from nothing to the most.
+        let beam = self.leans / 12f64.sqrt();
+        let shared = [impact, swing, friction, short, bend, beam].iter().fold(0.0, |sum, part| sum + part * part);
         ((expected + shown) / n + shared).sqrt()
     }
 

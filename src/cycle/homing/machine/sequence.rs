@@ -145,16 +145,16 @@ impl Homing {
             touches.slid_back(side.sliding);
             side.holds(&plan, side.sliding);
             if let Some(fault) = side.held_back(&plan, touches.level()) {
-                return self.leave(self.or_racked(fault));
+                return self.leave(self.racked_back().filter(|_| fault.field == "torque\0").unwrap_or(fault));
             }
         }
         if self.suspect != Fault::NONE {
-            return self.leave(self.or_racked(self.suspect));
+            return self.leave(self.suspect);
         }
         let mut sides = self.sides.iter().zip(&self.touches).take(plan.motors);
         let elsewhere = |side: &Side, touches: &Touches| {
             let pressed = if back { None } else { side.pressed_elsewhere(&plan, touches) };
-            pressed.or_else(|| side.ended_elsewhere(&plan, touches))
+            pressed.or_else(|| side.ended_elsewhere(&plan, touches, side.end()))
         };
         if let Some(fault) = sides.find_map(|(side, touches)| elsewhere(side, touches)) {
             return self.leave(fault);
@@ -215,21 +215,27 @@ impl Homing {
             fault = Fault { code, field, value: way, low: 0.0, high };
         }
         if fault.code == GIB_ERR_HOMING_NO_STOP && self.touch > 0 {
-            fault.code = GIB_ERR_HOMING_TOUCHES; // it was there the first time
+            // It was there the first time.
+            fault = self.gone_beyond().unwrap_or(Fault { code: GIB_ERR_HOMING_TOUCHES, ..fault });
         }
         self.leave(fault);
+    }
+
+    /// By how much a motor has gone beyond where its first touch ended.
+    fn gone_beyond(&self) -> Option<Fault> {
+        let beyond = |(side, touches): (&Side, &Touches)| side.ended_elsewhere(&self.plan, touches, side.position);
+        self.sides.iter().zip(&self.touches).take(self.plan.motors).find_map(beyond)
     }
 
     /// Every motor has pressed for the detection time.
     #[cold]
     pub(super) fn pressed(&mut self) {
         let plan = self.plan;
-        self.keep_apart();
         if self.touch == 0 {
             let way = self.sides.iter().take(plan.motors).map(|side| side.travel(&plan)).fold(f64::INFINITY, f64::min);
             let early = |code, low| Fault { code, field: "distance_min_mm\0", value: way, low, high: plan.distance[1] };
-            if self.sides.iter().take(plan.motors).any(|side| side.stuck_high(&plan)) {
-                return self.leave(Fault { field: "torque\0", ..Fault::of(GIB_ERR_HOMING_TORQUE_STUCK) });
+            if let Some(side) = self.sides.iter().take(plan.motors).find(|side| side.stuck_high(&plan)) {
+                return self.leave(side.name_stuck(&plan, plan.hold - 1));
             }
             if way < plan.retract {
                 return self.leave(early(GIB_ERR_HOMING_ON_STOP, plan.retract));
@@ -272,13 +278,19 @@ impl Homing {
     fn conclude(&mut self) {
         self.plan.moves_at(self.plan.offset_speed.max(self.plan.touch));
         let plan = self.plan;
+        // A side that the beam holds or pulls says more than that its touches disagree.
+        if plan.motors == 2 {
+            if let Err(fault) = self.squared() {
+                return self.leave(fault);
+            }
+        }
         for i in 0..plan.motors.min(2) {
             if let Err(fault) = self.touches[i].agree(&plan) {
                 return self.leave(fault);
             }
         }
-        if let Err(fault) = self.squared() {
-            return self.leave(fault);
+        if plan.motors == 2 {
+            self.reckon_beam();
         }
         let mut bound = 0f64;
         for i in 0..plan.motors.min(2) {

@@ -52,7 +52,7 @@ impl Side {
     pub fn contradiction(&self, plan: &Plan, otherwise: Fault) -> Fault {
         if self.back(plan) && self.filtered < -0.5 * plan.threshold {
             let (code, field) = (GIB_ERR_HOMING_TIGHT_SPOT, "torque\0");
-            return Fault { code, field, value: self.filtered, low: 0.0, high: plan.limit };
+            return Fault { code, field, value: self.filtered, low: -0.5 * plan.threshold, high: plan.limit };
         }
         self.torque_fault(plan).unwrap_or(otherwise)
     }
@@ -62,35 +62,73 @@ impl Side {
     pub fn broken_sensor(&self, plan: &Plan) -> Fault {
         // A torque that jumped and stands since.
         if self.stuck(plan) || self.same >= 1 {
-            return Fault { value: self.reading, field: "torque\0", ..Fault::of(GIB_ERR_HOMING_TORQUE_STUCK) };
+            return self.name_stuck(plan, 0);
         }
         if self.loaded && self.position == self.start {
-            return Fault { value: self.reading, field: "torque\0", ..Fault::of(GIB_ERR_HOMING_ON_STOP) };
+            let (field, low, high) = ("distance_min_mm\0", plan.retract, plan.distance[1]);
+            return Fault { code: GIB_ERR_HOMING_ON_STOP, field, value: 0.0, low, high };
         }
-        if 3.0 * self.noise() > RIGID * plan.limit {
-            return Fault { value: self.reading, field: "torque\0", ..Fault::of(GIB_ERR_HOMING_NOISE) };
+        if self.drowns(plan) {
+            return self.name_noise(plan);
         }
         // A servo whose encoder stands winds its torque up in the sense of the command; a command that does not reach
         // the servo leaves it as it is.
         let sense = if self.back(plan) { -1.0 } else { 1.0 };
         let along = |torque: f64| sense * plan.torque_sense * torque;
         if along(self.free[0]) > FLIPPED * plan.limit && along(self.reading) < -FLIPPED * plan.limit {
-            let code = GIB_ERR_HOMING_TORQUE_SIGN;
-            return Fault { field: "torque_inverted\0", value: self.reading, ..Fault::of(code) };
+            let (code, low) = (GIB_ERR_HOMING_TORQUE_SIGN, -FLIPPED * plan.limit);
+            return Fault { code, field: "torque\0", value: along(self.reading), low, high: plan.limit };
         }
         let wound = sense * (self.filtered - self.free[1]) > 0.05 * plan.limit + 4.0 * FILTERED * self.noise();
         let code = if wound { GIB_ERR_HOMING_ENCODER } else { GIB_ERR_LAG };
-        let otherwise = Fault { field: "position_mm\0", value: self.position, ..Fault::of(code) };
-        self.torque_fault(plan).unwrap_or(otherwise)
+        self.torque_fault(plan).unwrap_or(Fault { code, ..self.name_rigid(plan) })
+    }
+
+    /// What says that the encoder should not stand, see [`Side::rigid`]: the torque, or for how long it does.
+    fn name_rigid(&self, plan: &Plan) -> Fault {
+        let (share, patience) = self.rigid_by(plan);
+        let most = share * plan.limit;
+        let fault = |field, value, low, high| Fault { code: GIB_ERR_HOMING_ENCODER, field, value, low, high };
+        if self.changed_by(most) {
+            fault("torque\0", self.reading, self.free[0] - most, self.free[0] + most)
+        } else if self.never_moved(plan) {
+            fault("torque\0", self.filtered, -plan.threshold, plan.threshold)
+        } else {
+            fault("position_same_cycles\0", f64::from(self.frozen), 0.0, f64::from(patience))
+        }
+    }
+
+    /// What says that the torque reading is stuck, see [`Side::stuck`]: the way gone under it, or for how many cycles it stands where
+    /// `high` may be.
+    pub fn name_stuck(&self, plan: &Plan, high: u32) -> Fault {
+        let fault = |field, value, high| Fault { code: GIB_ERR_HOMING_TORQUE_STUCK, field, value, low: 0.0, high };
+        let (way, most) = ((self.position - self.changed_at).abs(), 0.25 * plan.retract);
+        if way > most {
+            fault("torque_same_mm\0", way, most)
+        } else if self.same > high {
+            fault("torque_same_cycles\0", f64::from(self.same), f64::from(high))
+        } else {
+            fault("torque_same_blocks\0", f64::from(STUCK_BLOCKS), f64::from(STUCK_BLOCKS - 1))
+        }
+    }
+
+    /// Whether noise may pass for a torque that tells of a standing encoder.
+    fn drowns(&self, plan: &Plan) -> bool {
+        3.0 * self.noise() > RIGID * plan.limit
+    }
+
+    fn name_noise(&self, plan: &Plan) -> Fault {
+        let [value, high] = [self.noise(), RIGID * plan.limit / 3.0].map(|torque| torque * plan.torque_nm);
+        Fault { code: GIB_ERR_HOMING_NOISE, field: "noise_nm\0", value, low: 0.0, high }
     }
 
     /// What is wrong with the torque of an axis that stands against its command, if anything.
     fn torque_fault(&self, plan: &Plan) -> Option<Fault> {
-        let fault = |code, field, value| Some(Fault { code, field, value, low: 0.0, high: plan.limit });
+        let (value, low) = (lower(self.filtered, plan.torque_sense * self.reading), -0.5 * plan.threshold);
         if self.stuck(plan) {
-            fault(GIB_ERR_HOMING_TORQUE_STUCK, "torque\0", self.reading)
-        } else if lower(self.filtered, plan.torque_sense * self.reading) < -0.5 * plan.threshold && !self.back(plan) {
-            fault(GIB_ERR_HOMING_TORQUE_SIGN, "torque_inverted\0", self.filtered)
+            Some(self.name_stuck(plan, 0))
+        } else if value < low && !self.back(plan) {
+            Some(Fault { code: GIB_ERR_HOMING_TORQUE_SIGN, field: "torque\0", value, low, high: plan.limit })
         } else {
             None
         }
@@ -121,14 +159,22 @@ impl Side {
     /// something infinitely rigid. Both the reading and its filtered value must say so: one is noisy, one is late.
     #[must_use]
     pub fn rigid(&self, plan: &Plan) -> bool {
-        let under_way = (self.position - self.from).abs() > UNDER_WAY * plan.retract;
-        let touches = self.from == self.origin;
-        let never_moved = touches && self.position == self.origin && self.filtered >= plan.threshold;
-        let share = if under_way { RIGID } else { RIGID_AFTER_TURN };
+        let (share, patience) = self.rigid_by(plan);
         let changed = self.changed_by(share * plan.limit);
-        let patience = if under_way { self.frozen_limit } else { 3 * self.frozen_limit };
         let long = self.frozen > patience && self.filtered.abs() < plan.release;
-        never_moved || changed || long
+        self.never_moved(plan) || changed || long
+    }
+
+    /// Whether the torque is at the limit before a touch has moved the axis at all.
+    fn never_moved(&self, plan: &Plan) -> bool {
+        let touches = self.from == self.origin;
+        touches && self.position == self.origin && self.filtered >= plan.threshold
+    }
+
+    /// Share of the limit by which the torque may change, and cycles, while the encoder stands.
+    fn rigid_by(&self, plan: &Plan) -> (f64, u32) {
+        let under_way = (self.position - self.from).abs() > UNDER_WAY * plan.retract;
+        if under_way { (RIGID, self.frozen_limit) } else { (RIGID_AFTER_TURN, 3 * self.frozen_limit) }
     }
 
     /// Whether the torque has changed by more than that since the encoder stands.
@@ -160,12 +206,9 @@ impl Side {
             return None;
         }
         let (low, high) = (low * plan.torque_sense, high * plan.torque_sense);
-        let odd = Fault { value: self.reading, field: "torque\0", ..Fault::NONE };
-        Some(if 3.0 * self.noise() > RIGID * plan.limit {
-            Fault { code: GIB_ERR_HOMING_NOISE, ..odd }
-        } else {
-            Fault { code: GIB_ERR_HOMING_ENCODER, low: low.min(high), high: low.max(high), ..odd }
-        })
+        let (code, field, value) = (GIB_ERR_HOMING_ENCODER, "torque\0", torque * plan.torque_sense);
+        let odd = Fault { code, field, value, low: low.min(high), high: low.max(high) };
+        Some(if self.drowns(plan) { self.name_noise(plan) } else { odd })
     }
 
     /// What is wrong where a motor stands pressed after its deviation was cleared, if anything: something is pressed on, but at a place
@@ -184,23 +227,26 @@ impl Side {
     /// is said of a way back too short to slide steadily.
     #[must_use]
     pub fn held_back(&self, plan: &Plan, level: f64) -> Option<Fault> {
-        let fault = |code, field, value, high| Some(Fault { code, field, value, low: 0.0, high });
-        let (above, high) = (self.sliding - self.lowest, 0.5 * (plan.threshold - level));
-        let stayed = plan.sense * (self.position - self.profile.position) > 0.5 * plan.retract;
-        if stayed && self.lowest > -0.5 * plan.threshold {
-            // Nothing pulled.
-            fault(GIB_ERR_LAG, "position_mm\0", self.profile.position - self.position, plan.lag_limit)
-        } else if self.sliding.max(self.filtered) >= plan.release {
+        let fault = |code, field, value, low, high| Some(Fault { code, field, value, low, high });
+        // A stop pushes the axis back; a tight spot takes as much torque above what sliding takes both ways.
+        let low = self.sliding - 0.5 * (plan.threshold - level) - 4.0 * FILTERED * self.noise();
+        let (behind, most) = (self.profile.position - self.position, 0.5 * plan.retract);
+        let (stayed, pulls) = (-plan.sense * behind > most, self.lowest <= -0.5 * plan.threshold);
+        let held = self.sliding.max(self.filtered);
+        if stayed && !pulls {
+            fault(GIB_ERR_LAG, "position_mm\0", behind, -most, most)
+        } else if held >= plan.release {
             // Away from the stop, and still at the limit toward it.
-            fault(GIB_ERR_HOMING_TORQUE_STUCK, "torque\0", self.reading, plan.release)
-        } else if stayed || above > high + 4.0 * FILTERED * self.noise() {
-            // A stop pushes the axis back; a tight spot takes as much torque above what sliding takes both ways.
-            // A torque that pulls hard now pushed before: it is alive, though it stands at the drive's limit without noise.
-            let dead = self.stuck(plan) && self.lowest > -0.5 * plan.threshold;
-            let code = if dead { GIB_ERR_HOMING_TORQUE_STUCK } else { GIB_ERR_HOMING_TIGHT_SPOT };
-            fault(code, "torque\0", -self.lowest, plan.limit)
-        } else {
+            fault(GIB_ERR_HOMING_TORQUE_STUCK, "torque\0", held, -plan.limit, plan.release)
+        } else if !(stayed || self.lowest < low) {
             None
+        } else if self.stuck(plan) && !pulls {
+            // A torque that pulls hard now pushed before: it is alive, though it stands at the drive's limit without noise.
+            Some(self.name_stuck(plan, 0))
+        } else if stayed {
+            fault(GIB_ERR_HOMING_TIGHT_SPOT, "position_mm\0", behind, -most, most)
+        } else {
+            fault(GIB_ERR_HOMING_TIGHT_SPOT, "torque\0", self.lowest, low, plan.limit)
         }
     }
 
@@ -257,11 +303,11 @@ impl Side {
         (way < low).then_some(Fault { code, field, value: way, low, high: plan.retract })
     }
 
-    /// What is wrong with a measured touch that ends elsewhere than the first did, by more than all of the way that a stop gives
-    /// under the limit: it was no stop, one time or the other.
+    /// What is wrong with a measured touch that ends, at `end`, elsewhere than the first did, by more than all of the way that a stop
+    /// gives under the limit: it was no stop, one time or the other.
     #[must_use]
-    pub fn ended_elsewhere(&self, plan: &Plan, touches: &Touches) -> Option<Fault> {
-        let (way, high) = ((self.anchor - touches.first_end).abs(), touches.press(plan) + plan.standing_way);
+    pub fn ended_elsewhere(&self, plan: &Plan, touches: &Touches, end: f64) -> Option<Fault> {
+        let (way, high) = ((end - touches.first_end).abs(), touches.press(plan) + plan.standing_way);
         let fault = Fault { field: "position_mm\0", value: way, ..Fault::of(GIB_ERR_HOMING_TOUCHES) };
         (way > high).then_some(Fault { low: 0.0, high, ..fault })
     }
