@@ -7,6 +7,7 @@
 //! Timing: how late the torque column is by the servo's sampling alone is known from the machine file ([`Sampling`]) and
 //! taken off before any dead time is looked for.
 
+mod coarse;
 mod swings;
 
 use super::filter::{LowPass, convolve, norm, of_three};

@@ -28,7 +28,8 @@ const NEAR_S: f64 = 0.025;
 pub struct Known {
     /// Torque and table − encoder that it expects.
     pub trace: Trace,
-    /// By how much its effects may be off there, because no law holds exactly: a standard deviation.
+    /// By how much its effects may be off there, because no law holds exactly, and the torque that was read, because its grid is
+    /// coarse: a standard deviation.
     pub doubt: Trace,
 }
 
@@ -37,7 +38,7 @@ impl Known {
     #[must_use]
     pub fn of(axis: &Axis, frame: &Frame) -> Known {
         let trace = Trace { torque: frame.believed(), table: vec![0.0; frame.table_error().len()] };
-        let doubt = Trace { torque: vec![0.0; trace.torque.len()], table: vec![0.0; trace.table.len()] };
+        let doubt = Trace { torque: frame.coarse_torque(), table: vec![0.0; trace.table.len()] };
         let mut known = Known { trace, doubt };
         if let Some(apart) = table_side::believed(frame, axis) {
             let flanks = axis.effects.iter().any(|e| e.cause() == Cause::Backlash);

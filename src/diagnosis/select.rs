@@ -135,6 +135,9 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     let mut best: Vec<Fit> = beam.clone();
     let mut rivals = Vec::new();
     for depth in 0..MOST {
+        if best.last().is_some_and(|fit| is_lost_in_steps(search.bench, fit)) {
+            break;
+        }
         // Most searches end after a cause or two, so that the first steps are most of the work.
         let share = |steps: usize| 0.8 - 0.65 * 0.4f64.powi(steps as i32);
         let mut grown = grow(search, &beam, (share(depth), share(depth + 1)))?;
@@ -178,6 +181,11 @@ fn grown_on(search: &Search, found: Selection) -> Result<Selection, Stopped> {
     let fit = shrink(search.bench, fit, search.watch)?;
     // Another formulation, as uncertain as before, is compared beside the same causes.
     Ok(if price(&fit) < price(&found.fit) { Selection { fit, alike: Vec::new(), ..found } } else { found })
+}
+
+/// Whether nothing is left beyond noise and what a coarse grid of the torque may make: what takes more off follows its steps.
+fn is_lost_in_steps(bench: &Bench, fit: &Fit) -> bool {
+    bench.frame.columns.torque_step > 0.0 && Excess::of(bench, fit, fit).largest() <= 0.0
 }
 
 /// Whether a set is worth going on from where another price was reached.

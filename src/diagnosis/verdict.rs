@@ -295,7 +295,12 @@ fn unexplained(bench: &Bench, fit: &Fit, shown: &[View], with_scale: bool) -> Un
     }
     let excess = Excess::of(bench, fit, fit);
     // Of nothing there is no noise.
-    let noise = |rest: &[f64], torque| if rms(rest) > 0.0 { bench.frame.floor(rest, torque) } else { 0.0 };
+    let coarse = rms(&bench.frame.coarse_torque());
+    let noise = |rest: &[f64], torque| match (rms(rest) > 0.0, bench.frame.floor(rest, torque)) {
+        (true, seen) if torque => seen.hypot(coarse).min(seen.max(rms(rest))),
+        (true, seen) => seen,
+        (false, _) => 0.0,
+    };
     let above_noise = |rest: &[f64], torque| (rms(rest) / noise(rest, torque)).powi(2) - 1.0;
     let left = |rest: &[f64], channel: usize, views: &[View]| Left {
         rms: rms(rest),

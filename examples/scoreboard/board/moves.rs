@@ -31,12 +31,19 @@ pub enum Segment {
 pub enum Style {
     /// Everything an identification wants.
     Mixed,
-    /// The same over a third of stroke and time, three times over.
+    /// The same on a third of the stroke and in a third of the time, three times over.
     Laps,
     /// Production: rapids between a few stations, and one slow reversal.
     Stations,
     /// Waves from slow to fast, after one way across the stroke.
     Sweep,
+}
+
+impl Style {
+    /// Share of the machine's stroke that it goes: what is hidden elsewhere is not in the recording.
+    pub fn share(self) -> f64 {
+        if self == Style::Laps { 1.0 / 3.0 } else { 1.0 }
+    }
 }
 
 /// Draws a run of that style.
@@ -50,8 +57,7 @@ pub fn draw_style(
     match style {
         Style::Mixed => draw(random, reach, duration, slow_share),
         Style::Laps => {
-            let part = Reach { high: reach.low + (reach.high - reach.low) / 3.0, ..*reach };
-            let (start, mut lap) = draw(random, &part, duration / 3.0, slow_share);
+            let (start, mut lap) = draw(random, reach, duration / 3.0, slow_share);
             lap.push(Segment::Move { to: start, speed: 0.5 * reach.speed, acceleration: 0.5 * reach.acceleration });
             (start, [lap.clone(), lap.clone(), lap].concat())
         }
@@ -296,11 +302,12 @@ mod tests {
     fn runs_of_every_style_keep_the_stroke_and_the_speed_and_go_across_it() {
         for seed in 0..40 {
             for style in [Style::Mixed, Style::Laps, Style::Stations, Style::Sweep] {
-                let (start, segments) = draw_style(&mut Random::new(seed, 2), style, &REACH, 15.0, 0.3);
+                let reach = Reach { high: REACH.low + style.share() * (REACH.high - REACH.low), ..REACH };
+                let (start, segments) = draw_style(&mut Random::new(seed, 2), style, &reach, 15.0, 0.3);
                 let Command { position: x, .. } = sample(start, &segments, 1e-3, 15.0, 0.0);
                 let (low, high) = x.iter().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
-                assert!(low > REACH.low - 1e-9 && high < REACH.high + 1e-9, "seed {seed} {style:?}: {low} {high}");
-                assert!(high - low > 0.15 * (REACH.high - REACH.low), "seed {seed} {style:?}: {low} {high}");
+                assert!(low > reach.low - 1e-9 && high < reach.high + 1e-9, "seed {seed} {style:?}: {low} {high}");
+                assert!(high - low > 0.15 * (reach.high - reach.low), "seed {seed} {style:?}: {low} {high}");
                 let fastest = x.windows(2).map(|w| (w[1] - w[0]).abs() / 1e-3).fold(0.0, f64::max);
                 assert!(
                     (0.2 * REACH.speed..1.0001 * REACH.speed).contains(&fastest),

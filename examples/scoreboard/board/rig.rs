@@ -159,10 +159,13 @@ impl Rig {
             random.pick(&[("mm", 1.0, 8), ("mm", 1.0, 8), ("mm", 1.0, 8), ("um", 1e3, 5), ("m", 1e-3, 11)])
         };
         let low = random.uniform(-0.5, 0.5) * stroke;
+        let pole_pairs = random.pick(&[3, 4, 5]);
+        let smoothing = if random.chance(0.5) { 0.0 } else { random.uniform(0.005, 0.04) };
+        let style = random.pick(&[Style::Mixed, Style::Mixed, Style::Laps, Style::Stations, Style::Sweep]);
         Self {
             drive,
             gearing,
-            pole_pairs: random.pick(&[3, 4, 5]),
+            pole_pairs,
             unit,
             inertia,
             coulomb,
@@ -175,10 +178,10 @@ impl Rig {
             torque_step,
             table,
             column,
-            reach: Reach { low, high: low + stroke, speed, acceleration },
-            smoothing: if random.chance(0.5) { 0.0 } else { random.uniform(0.005, 0.04) },
+            reach: Reach { low, high: low + style.share() * stroke, speed, acceleration },
+            smoothing,
             duration,
-            style: random.pick(&[Style::Mixed, Style::Mixed, Style::Laps, Style::Stations, Style::Sweep]),
+            style,
             every,
             rough: Rough::NONE,
         }
