@@ -16,6 +16,8 @@ use super::{Refusal, SPEED_RATIO, Value};
 use crate::analysis::statistics::{Mean, correlated_mean, deviation, grid, quantile, student_95};
 use crate::cycle::backlash::curve::Curve;
 use crate::cycle::backlash::fit::{Fit, Fitted, Levels};
+use crate::cycle::backlash::rounding::Rounded;
+use crate::cycle::backlash::uncertainty::{Give, systematic};
 use crate::cycle::backlash::verdict::check_reversal;
 use crate::error::status_text;
 use crate::machine::Axis;
@@ -68,6 +70,8 @@ pub struct TorqueLostMotion {
     pub mean: Estimate,
     /// Standard deviation from reversal to reversal; `None` with fewer than two.
     pub spread: Option<f64>,
+    /// Travel of the table itself before it slides, as the rounding of the curves shows it; it is taken off.
+    pub presliding: f64,
     /// How friction on the motor's side was found.
     pub motor_friction: MotorFriction,
     /// False when the uncertainty is more than a third of the value: no compensation should be written from it.
@@ -95,10 +99,17 @@ pub fn estimate(recording: &Recording, channel: &str, model: Option<&Axis>) -> R
         return Err(Refusal::NoCurve(turns.iter().map(Turn::why).collect()));
     };
     let (friction, source) = motor_friction(&pieces, &turns, about);
-    turns.iter_mut().for_each(|turn| turn.finish(&friction));
+    let fits: Vec<Result<Fitted, String>> = turns.iter().map(|turn| turn.with(&friction)).collect();
+    let mut give = Give::default();
+    fits.iter().flatten().for_each(|fitted| give.add(fitted));
     let resolution = pieces.iter().map(|piece| piece.resolution).fold(0.0, f64::max);
+    let width = turns.iter().map(Turn::width).fold(0.0, f64::max);
+    let told = give.told(systematic(resolution, width, 0.0, 0.0));
+    turns.iter_mut().zip(fits).for_each(|(turn, fitted)| turn.finish(fitted, &friction, told));
+    let alike =
+        |lost: f64| systematic(resolution, width, 0.0, lost) + give.untold(systematic(resolution, width, 0.0, 0.0));
     let mean =
-        joined(&turns, &friction, resolution).ok_or_else(|| Refusal::NoCurve(turns.iter().map(Turn::why).collect()))?;
+        joined(&turns, &friction, alike).ok_or_else(|| Refusal::NoCurve(turns.iter().map(Turn::why).collect()))?;
     let values: Vec<f64> = turns.iter().filter_map(|t| t.result.as_ref().ok()).map(|e| e.lost_motion.value).collect();
     Ok(TorqueLostMotion {
         channel: channel.to_owned(),
@@ -106,6 +117,7 @@ pub fn estimate(recording: &Recording, channel: &str, model: Option<&Axis>) -> R
         effort_unit: effort_unit.suffix(),
         mean,
         spread: (values.len() > 1).then(|| deviation(&values)),
+        presliding: if told { give.mean() } else { 0.0 },
         motor_friction: source,
         trustworthy: mean.lost_motion.uncertainty < 0.33 * mean.lost_motion.value,
         reversals: turns.into_iter().map(Turn::report).collect(),
@@ -242,8 +254,8 @@ fn steady(sweep: &Sweep) -> Option<Mean> {
     if steady.len() < FEWEST_ROWS { None } else { correlated_mean(&steady) }
 }
 
-/// Bins over the way to sliding.
-const BINS: f64 = 200.0;
+/// Bins over the way to sliding. The fit leaves out the first two, in which the motor's own friction turns round.
+const BINS: f64 = 60.0;
 
 /// Sets aside reversals at much more than the slowest speed at which one shows lost motion: there the torque also moves masses.
 fn leave_out_fast(turns: &mut [Turn]) {
@@ -294,24 +306,43 @@ impl Turn {
                 break;
             }
         }
-        let fitted =
-            check_reversal(fit.result()).map_err(|fault| status_text(fault.code).trim_end_matches('\0').to_owned())?;
+        let fitted = check_reversal(fit.result(), 1.0)
+            .map_err(|fault| status_text(fault.code).trim_end_matches('\0').to_owned())?;
         if self.way < 1.2 * fitted.lost_motion {
             return Err("the way before or after it is too short for the table to slide".into());
         }
         Ok(fitted)
     }
 
-    fn finish(&mut self, friction: &Friction) {
-        let change = self.levels.as_ref().map_or(0.0, |(before, after)| after.value - before.value);
-        let (motor, error) = friction.at(change);
-        self.result = self.fit(motor, error).map(|fitted| Estimate {
-            lost_motion: Value { value: fitted.lost_motion, uncertainty: 2.0 * fitted.variance.sqrt() },
-            clearance: fitted.clearance,
-            windup: fitted.windup,
-            stiffness: fitted.stiffness,
-            sliding: 0.5 * change,
-            motor_friction: motor,
+    fn change(&self) -> f64 {
+        self.levels.as_ref().map_or(0.0, |(before, after)| after.value - before.value)
+    }
+
+    fn with(&self, friction: &Friction) -> Result<Fitted, String> {
+        let (motor, error) = friction.at(self.change());
+        self.fit(motor, error)
+    }
+
+    /// Takes the fit, or what its rounding makes of it where the table's presliding is `told`.
+    fn finish(&mut self, fitted: Result<Fitted, String>, friction: &Friction, told: bool) {
+        let change = self.change();
+        self.result = fitted.map(|fitted| {
+            let straight = Rounded {
+                lost_motion: fitted.lost_motion,
+                variance: fitted.variance,
+                fit_variance: fitted.variance,
+                clearance: fitted.clearance,
+                stiffness: fitted.stiffness,
+            };
+            let found = fitted.rounded.filter(|_| told).unwrap_or(straight);
+            Estimate {
+                lost_motion: Value { value: found.lost_motion, uncertainty: 2.0 * found.variance.sqrt() },
+                clearance: found.clearance,
+                windup: found.lost_motion - found.clearance,
+                stiffness: found.stiffness,
+                sliding: 0.5 * change,
+                motor_friction: friction.at(change).0,
+            }
         });
     }
 
@@ -345,8 +376,8 @@ impl Turn {
 }
 
 /// Mean over the reversals, each sense counted alike. The variance is the larger of what the fits expect and what the
-/// reversals show; the grid of the encoder is in every one of them alike.
-fn joined(turns: &[Turn], friction: &Friction, resolution: f64) -> Option<Estimate> {
+/// reversals show; what is `alike` in every one of them, a variance for their mean, does not average out.
+fn joined(turns: &[Turn], friction: &Friction, alike: impl Fn(f64) -> f64) -> Option<Estimate> {
     let sense = |direction: f64| -> Vec<&Estimate> {
         turns.iter().filter(|t| t.direction == direction).filter_map(|t| t.result.as_ref().ok()).collect()
     };
@@ -364,12 +395,9 @@ fn joined(turns: &[Turn], friction: &Friction, resolution: f64) -> Option<Estima
     let values = |s: &Vec<&Estimate>| s.iter().map(|e| e.lost_motion.value).collect::<Vec<f64>>();
     let squares: f64 = senses.iter().map(|s| deviation(&values(s)).powi(2) * (s.len() - 1) as f64).sum();
     let seen = if free > 0.0 { (student_95(free) / 1.96).powi(2) * squares / free / n } else { 0.0 };
-    let grid = resolution * resolution / 6.0;
+    let value = mean(|e| e.lost_motion.value);
     Some(Estimate {
-        lost_motion: Value {
-            value: mean(|e| e.lost_motion.value),
-            uncertainty: 2.0 * (expected.max(seen) + common + grid).sqrt(),
-        },
+        lost_motion: Value { value, uncertainty: 2.0 * (expected.max(seen) + common + alike(value)).sqrt() },
         clearance: mean(|e| e.clearance),
         windup: mean(|e| e.windup),
         stiffness: mean(|e| e.stiffness),

@@ -5,7 +5,7 @@
 
 use super::from_torque::{Piece, Turn};
 use super::sweeps::{Sample, Sweep};
-use crate::analysis::statistics::deviation;
+use crate::analysis::statistics::{deviation, student_95};
 
 /// How friction on the motor's side was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,7 +43,7 @@ pub(super) fn motor_friction(pieces: &[Piece], turns: &[Turn], about: f64) -> (F
         let fitted = turn.fit(0.0, 0.0).ok()?;
         let (before, after) = turn.levels.as_ref().ok()?;
         let wide = fitted.clearance > CLEARANCE_SHARE * fitted.lost_motion && fitted.clearance > 4.0 * turn.width();
-        wide.then(|| (fitted.level - 0.5 * (before.value + after.value)).max(0.0))
+        wide.then(|| fitted.level - 0.5 * (before.value + after.value))
     };
     let levels: Vec<f64> = turns.iter().filter_map(level).collect();
     match mean_of(&levels) {
@@ -52,10 +52,11 @@ pub(super) fn motor_friction(pieces: &[Piece], turns: &[Turn], about: f64) -> (F
     }
 }
 
-/// Mean and its standard error; `None` for fewer than two values.
+/// Mean and its standard error, at least 0; `None` for fewer than two values. Single ones may be below by chance.
 fn mean_of(values: &[f64]) -> Option<(f64, f64)> {
     let n = values.len() as f64;
-    (values.len() > 1).then(|| (values.iter().sum::<f64>() / n, deviation(values) / n.sqrt()))
+    (values.len() > 1)
+        .then(|| ((values.iter().sum::<f64>() / n).max(0.0), student_95(n - 1.0) / 1.96 * deviation(values) / n.sqrt()))
 }
 
 /// The motor's friction from each short way back and forth: half the distance of two parallel lines of effort over position.
@@ -64,7 +65,8 @@ fn probes(piece: &Piece, about: f64) -> Vec<f64> {
     let one = |ways: &[Sweep]| {
         let [into, ends @ ..] = ways else { return None };
         // Only the first way back, from where the table slid, and the way forth again: then the table has not moved between.
-        let short = ends[0].way() < 0.6 * about && into.way() > 1.5 * ends[0].way();
+        // A wiggle as the motor comes to rest turns no friction round.
+        let short = ends[0].way() < 0.6 * about && ends[0].way() > 0.1 * about && into.way() > 1.5 * ends[0].way();
         if !short || ends[1].way() < 0.9 * ends[0].way() {
             return None;
         }
@@ -78,7 +80,7 @@ fn probes(piece: &Piece, about: f64) -> Vec<f64> {
         if back.len() < FEWEST_ROWS || forth.len() < FEWEST_ROWS {
             return None;
         }
-        Some(0.5 * ends[1].direction * apart(&back, &forth)).filter(|friction| *friction >= 0.0)
+        Some(0.5 * ends[1].direction * apart(&back, &forth))
     };
     piece.sweeps.windows(3).filter_map(one).collect()
 }

@@ -29,6 +29,14 @@ pub fn text(file: &str, found: &TorqueLostMotion, measured: Option<f64>) -> Stri
         display.number(mean.windup),
         unit = display.unit,
     );
+    if found.presliding > 0.0 {
+        let _ = writeln!(
+            text,
+            "  the table itself gives way by about {} {} before it slides: taken off, and as much held in the uncertainty",
+            display.number(found.presliding),
+            display.unit
+        );
+    }
     if !found.trustworthy {
         text += "  The uncertainty is more than a third of the value: do not compensate with it.\n";
     }
@@ -95,6 +103,7 @@ pub fn as_json(found: &TorqueLostMotion, measured: Option<f64>) -> Json {
     root.insert("coverage_factor".into(), json!(2));
     put(&mut root, &found.mean);
     root.insert("trustworthy".into(), json!(found.trustworthy));
+    root.insert(format!("presliding_{unit}"), json!(factor * found.presliding));
     root.insert(format!("spread_{unit}"), json!(found.spread.map(|spread| factor * spread)));
     let source = match found.motor_friction {
         MotorFriction::Probe => "probe",

@@ -1,16 +1,16 @@
-//! The normal equations of a fit with four parameters.
+//! The normal equations of a fit with a few parameters.
 
-/// A symmetric positive definite system of four, factored.
+/// A symmetric positive definite system, factored.
 #[derive(Debug)]
-pub struct Cholesky([[f64; 4]; 4]);
+pub struct Cholesky<const N: usize>([[f64; N]; N]);
 
-impl Cholesky {
+impl<const N: usize> Cholesky<N> {
     /// Factors the matrix; `None` when it is singular.
     #[must_use]
-    pub fn new(matrix: [[f64; 4]; 4]) -> Option<Cholesky> {
+    pub fn new(matrix: [[f64; N]; N]) -> Option<Cholesky<N>> {
         const SINGULAR: f64 = 1e-10;
-        let mut l = [[0.0; 4]; 4];
-        for i in 0..4 {
+        let mut l = [[0.0; N]; N];
+        for i in 0..N {
             for j in 0..=i {
                 let dot: f64 = (0..j).map(|m| l[i][m] * l[j][m]).sum();
                 let rest = matrix[i][j] - dot;
@@ -28,10 +28,10 @@ impl Cholesky {
     }
 
     /// L⁻¹·right.
-    fn forward(&self, right: [f64; 4]) -> [f64; 4] {
+    fn forward(&self, right: [f64; N]) -> [f64; N] {
         let l = &self.0;
         let mut y = right;
-        for i in 0..4 {
+        for i in 0..N {
             let dot: f64 = (0..i).map(|m| l[i][m] * y[m]).sum();
             y[i] = (y[i] - dot) / l[i][i];
         }
@@ -40,17 +40,17 @@ impl Cholesky {
 
     /// g·A⁻¹·g, the variance of a sum weighted with g, as |L⁻¹·g|².
     #[must_use]
-    pub fn inverse_form(&self, g: [f64; 4]) -> f64 {
+    pub fn inverse_form(&self, g: [f64; N]) -> f64 {
         self.forward(g).iter().map(|y| y * y).sum()
     }
 
     /// A⁻¹·right.
     #[must_use]
-    pub fn solve(&self, right: [f64; 4]) -> [f64; 4] {
+    pub fn solve(&self, right: [f64; N]) -> [f64; N] {
         let l = &self.0;
         let mut y = self.forward(right);
-        for i in (0..4).rev() {
-            let dot: f64 = (i + 1..4).map(|m| l[m][i] * y[m]).sum();
+        for i in (0..N).rev() {
+            let dot: f64 = (i + 1..N).map(|m| l[m][i] * y[m]).sum();
             y[i] = (y[i] - dot) / l[i][i];
         }
         y

@@ -24,6 +24,7 @@
 
 use super::cholesky::Cholesky;
 use super::curve::{BINS, Curve, Moments};
+use super::rounding::{Line, Rounded, Rounding};
 
 /// What is known of a reversal besides its curve. Torques in the curve's unit and sense.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -73,10 +74,16 @@ pub struct Fitted {
     pub share: f64,
     /// True when residuals show structure at every share: the curve has not the expected shape.
     pub structured: bool,
+    /// The same curve with the table's presliding; `None` where that cannot be told.
+    pub rounded: Option<Rounded>,
 }
 
 /// Shares of the wind-up tried, largest first.
 const SHARES: [f64; 3] = [0.65, 0.5, 0.35];
+/// Share up to which a rounded curve is followed: the bend shows most near to sliding.
+const ROUNDED: f64 = 0.8;
+/// All of these.
+const MARKS: [f64; 4] = [SHARES[0], SHARES[1], SHARES[2], ROUNDED];
 /// Grid points for each kink.
 const GRID: usize = 24;
 /// Trials in one slice of the search.
@@ -117,6 +124,8 @@ enum Stage {
     Residuals { bin: usize, last: f64, count: f64, squares: f64, differences: f64 },
     /// Weighs the residuals; ends at once.
     Judge { count: f64, squares: f64, differences: f64 },
+    /// The rounded curve; ends with `Rounding`.
+    Round,
     /// The result stands.
     Done,
 }
@@ -130,13 +139,15 @@ pub struct Fit {
     first: usize,
     end: usize,
     /// One past the bin at which the smoothed curve last passed each share on its way to sliding; `usize::MAX`: not.
-    ends: [usize; SHARES.len()],
+    ends: [usize; MARKS.len()],
     /// The same on the way that it is on.
-    passed: [usize; SHARES.len()],
+    passed: [usize; MARKS.len()],
     smooth: f64,
     highest: f64,
     best: Trial,
     chosen: Option<Fitted>,
+    line: Line,
+    rounding: Rounding,
     sums: [Moments; BINS + 1],
 }
 
@@ -148,12 +159,14 @@ impl Default for Fit {
             share: 0,
             first: 0,
             end: 0,
-            ends: [0; SHARES.len()],
-            passed: [0; SHARES.len()],
+            ends: [0; MARKS.len()],
+            passed: [0; MARKS.len()],
             smooth: 0.0,
             highest: 0.0,
             best: NO_TRIAL,
             chosen: None,
+            line: Line::default(),
+            rounding: Rounding::default(),
             sums: [Moments::default(); BINS + 1],
         }
     }
@@ -165,7 +178,7 @@ impl Fit {
         self.levels = levels;
         self.share = 0;
         self.first = 0;
-        self.ends = [usize::MAX; SHARES.len()];
+        self.ends = [usize::MAX; MARKS.len()];
         self.passed = self.ends;
         self.smooth = levels.before;
         self.highest = f64::NEG_INFINITY;
@@ -184,6 +197,7 @@ impl Fit {
             Stage::Residuals { bin, last, count, squares, differences } => {
                 self.residuals(curve, bin, last, count, squares, differences);
             }
+            Stage::Round => self.round(curve),
             Stage::Done => return true,
         }
         matches!(self.stage, Stage::Done)
@@ -199,7 +213,7 @@ impl Fit {
     #[must_use]
     pub const fn slices_bound() -> u32 {
         let passes = 2 * (BINS / SLICE + 2) + GRID * GRID / TRIALS + 2 + 2 * STEPS as usize + 4;
-        (passes * SHARES.len()) as u32
+        (passes * SHARES.len()) as u32 + Rounding::slices_bound(BINS)
     }
 
     fn running(&self, bins: usize) -> &Moments {
@@ -210,6 +224,7 @@ impl Fit {
     /// may pass some for a moment.
     fn sum(&mut self, curve: &Curve, from: usize) {
         const SMOOTHING: f64 = 0.3; // about three bins
+        const LAG: usize = 2; // (1 − 0.3)/0.3: so late does the smoothed curve pass a share
         const SLIDING: f64 = 0.85; // from there on a reading may fall again: the table sticks and slips
         let to = (from + SLICE).min(curve.used());
         // The rise starts at the motor's friction, and at more where the middle of the levels is a torque sensor's zero
@@ -228,8 +243,8 @@ impl Fit {
                 sums = sums.with(n, s, t);
                 self.smooth += SMOOTHING * (t - self.smooth);
                 let share = (self.smooth - from_level) / rise;
-                for (passed, wanted) in self.passed.iter_mut().zip(SHARES) {
-                    *passed = if share >= wanted { (*passed).min(bin + 1) } else { usize::MAX };
+                for (passed, wanted) in self.passed.iter_mut().zip(MARKS) {
+                    *passed = if share >= wanted { (*passed).min((bin + 1).saturating_sub(LAG)) } else { usize::MAX };
                 }
                 if share > self.highest && self.highest < SLIDING {
                     self.highest = share;
@@ -259,7 +274,7 @@ impl Fit {
                 return Stage::Search { next: 0 };
             }
         }
-        Stage::Done
+        self.round_off(curve)
     }
 
     /// The stretch before `s`, as a number of bins between `first` and `end`.
@@ -407,6 +422,12 @@ impl Fit {
         let correlation = (1.0 - 0.5 * ratio).clamp(0.0, 0.9);
         let inflation = (1.0 + correlation) / (1.0 - correlation);
         let noise = squares / (count - PARAMETERS).max(1.0);
+        if self.best.s2 - self.best.s1 < curve.width_mm() {
+            // One straight line: only its slope is known, and the kink lies where the spring's torque passes zero.
+            let (t, zero) = (self.best, 0.5 * (self.levels.before + self.levels.after) + self.levels.motor);
+            let middle = 0.5 * (t.s1 + t.s2) + (zero - t.c) / t.k;
+            self.best = Trial { s1: middle, s2: middle, c: zero, ..t };
+        }
         let fitted = self.derive(curve, noise, inflation, structured);
         let better = match (&self.chosen, &fitted) {
             (_, None) => false,
@@ -415,20 +436,33 @@ impl Fit {
         };
         if better {
             self.chosen = fitted;
+            let Trial { s1, s2, c, k, .. } = self.best;
+            self.line = Line { s1, s2, c, k };
         }
-        if structured { self.next_share(curve, self.share + 1) } else { Stage::Done }
+        if structured { self.next_share(curve, self.share + 1) } else { self.round_off(curve) }
+    }
+
+    /// Sets up the rounded fit over the largest share that the curve reaches.
+    fn round_off(&mut self, curve: &Curve) -> Stage {
+        let end = self.ends.iter().filter(|end| **end != usize::MAX).max();
+        let (Some(_), Some(end)) = (&self.chosen, end) else { return Stage::Done };
+        let width = curve.width_mm();
+        self.rounding.start(self.line, self.levels, self.first, (*end).min(curve.used()), width);
+        Stage::Round
+    }
+
+    fn round(&mut self, curve: &Curve) {
+        if self.rounding.advance(curve) {
+            if let Some(fitted) = &mut self.chosen {
+                fitted.rounded = self.rounding.result();
+            }
+            self.stage = Stage::Done;
+        }
     }
 
     /// Lost motion and its variance from the fitted kinks, slope and levels.
     fn derive(&self, curve: &Curve, noise: f64, inflation: f64, structured: bool) -> Option<Fitted> {
-        let mut t = self.best;
-        let change = self.levels.spring_change();
-        if t.s2 - t.s1 < curve.width_mm() {
-            // One straight line: only its slope is known, and the kink lies where the spring's torque passes zero.
-            let zero = 0.5 * (self.levels.before + self.levels.after) + self.levels.motor;
-            let middle = 0.5 * (t.s1 + t.s2) + (zero - t.c) / t.k;
-            t = Trial { s1: middle, s2: middle, c: zero, ..t };
-        }
+        let (t, change) = (self.best, self.levels.spring_change());
         // Kinks that meet leave their distance open: its uncertainty is that of kinks a tenth of the stretch apart.
         let apart = 0.5 * (0.1 * (self.end - self.first) as f64 * curve.width_mm() - (t.s2 - t.s1)).max(0.0);
         let wider = |down: f64, up: f64| Trial { s1: t.s1 - down * apart, s2: t.s2 + up * apart, ..t };
@@ -464,6 +498,7 @@ impl Fit {
             noise: noise.sqrt(),
             share: SHARES[self.share.min(SHARES.len() - 1)],
             structured,
+            rounded: None,
         })
     }
 }

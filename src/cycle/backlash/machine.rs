@@ -15,7 +15,7 @@ use super::fit::{Fit, Levels};
 use super::io::*;
 use super::peak::Peak;
 use super::plan::Plan;
-use super::verdict::{BacklashEstimate, BacklashReport, Sense};
+use super::verdict::{BacklashReport, Estimates, Sense};
 use crate::cycle::level::Level;
 use crate::cycle::profile::Profile;
 use crate::error::*;
@@ -130,8 +130,7 @@ pub struct Backlash {
     active_um: f64,
     /// True while the kernel runs with something that gib changed and has not put right.
     changed: bool,
-    estimates: [BacklashEstimate; 2],
-    mean: BacklashEstimate,
+    estimates: Estimates,
     output: BacklashOutput,
     curves: [Curve; 2],
     fit: Fit,
@@ -169,8 +168,7 @@ impl Default for Backlash {
             parked_um: 0.0,
             active_um: 0.0,
             changed: false,
-            estimates: [BacklashEstimate::default(); 2],
-            mean: BacklashEstimate::default(),
+            estimates: Estimates::default(),
             output: BacklashOutput::default(),
             curves: [Curve::default(), Curve::default()],
             fit: Fit::default(),
@@ -197,8 +195,7 @@ impl Backlash {
         self.plan = plan?;
         self.fault = Fault::NONE;
         self.senses = [Sense::default(); 2];
-        self.estimates = [BacklashEstimate::default(); 2];
-        self.mean = BacklashEstimate::default();
+        self.estimates = Estimates::default();
         self.written_um = None;
         self.curves.iter_mut().for_each(|curve| curve.start(self.plan.bin));
         self.smallest_change = f64::INFINITY;
@@ -260,8 +257,8 @@ impl Backlash {
     pub fn report(&self) -> BacklashReport {
         let written = self.phase == Phase::Done && self.written_um.is_some();
         BacklashReport {
-            each: self.estimates,
-            mean: self.mean,
+            each: self.estimates.each,
+            mean: self.estimates.mean,
             old_value_um: self.old_um.filter(|_| written).unwrap_or(self.fallback_um),
             value_written_um: self.written_um.unwrap_or(0.0),
             value_active_um: self.active_um,
@@ -270,7 +267,7 @@ impl Backlash {
             mode: i32::from(!self.plan.slow_feed),
             written: i32::from(written),
             restore_owed: i32::from(self.changed && self.phase == Phase::Failed),
-            reserved: 0,
+            presliding_permille: self.estimates.presliding_permille,
         }
     }
 

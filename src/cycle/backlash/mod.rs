@@ -14,6 +14,8 @@
 //! | [`machine`] | the state machine called once per servo cycle |
 //! | [`curve`] | torque against travel |
 //! | [`fit`] (its normal equations in `cholesky`), [`peak`] | lost motion from a curve: ours and the published rule |
+//! | [`rounding`] | the table's presliding, from the same curve |
+//! | [`uncertainty`] | what repeats, reversals alike and the shape of the presliding leave open |
 //! | [`verdict`] | means, uncertainty, and whether to trust them |
 
 mod cholesky;
@@ -24,4 +26,6 @@ pub mod io;
 pub mod machine;
 pub mod peak;
 pub mod plan;
+pub mod rounding;
+pub mod uncertainty;
 pub mod verdict;

@@ -5,6 +5,7 @@
 
 use super::fit::{Fitted, Levels};
 use super::plan::Plan;
+use super::uncertainty::{Give, systematic, variance_of_mean};
 use crate::error::{
     Fault, GIB_ERR_BACKLASH_DIRECTIONS, GIB_ERR_BACKLASH_LIMIT, GIB_ERR_BACKLASH_MOTOR_FRICTION,
     GIB_ERR_BACKLASH_NOISE, GIB_ERR_BACKLASH_RESOLUTION, GIB_ERR_BACKLASH_SHAPE, GIB_ERR_STATE, in_range,
@@ -73,8 +74,9 @@ pub struct BacklashReport {
     pub written: i32,
     /// 1 while a restore is owed that the kernel has not confirmed.
     pub restore_owed: i32,
-    /// Zero.
-    pub reserved: i32,
+    /// Travel of the table itself before it slides that showed in the rounding of the curves and was taken off the lost
+    /// motion, in ‰ of the mean's lost motion; 0 where none shows beyond chance.
+    pub presliding_permille: i32,
 }
 
 /// The estimate beside a value measured otherwise.
@@ -113,10 +115,9 @@ impl BacklashReport {
     }
 }
 
-/// Everything measured so far in one sense.
+/// Sums over reversals of what one way of fitting gives.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Sense {
-    reversals: f64,
+struct Values {
     sum: f64,
     squares: f64,
     variances: f64,
@@ -124,6 +125,27 @@ pub struct Sense {
     windup: f64,
     held: f64,
     stiffness: f64,
+}
+
+impl Values {
+    fn add(&mut self, lost_motion: f64, variance: f64, clearance: f64, held: f64, stiffness: f64) {
+        self.sum += lost_motion;
+        self.squares += lost_motion * lost_motion;
+        self.variances += variance;
+        self.clearance += clearance;
+        self.windup += lost_motion - clearance;
+        self.held += held;
+        self.stiffness += stiffness;
+    }
+}
+
+/// Everything measured so far in one sense.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Sense {
+    reversals: f64,
+    straight: Values,
+    rounded: Values,
+    give: Give,
     stiffness_variance: f64,
     sliding: f64,
     motor: f64,
@@ -138,13 +160,16 @@ impl Sense {
     /// Adds a reversal: its fit, its levels, the peak rule's reading (mm) if any, and the points of its curve.
     pub fn add(&mut self, fit: &Fitted, levels: &Levels, peak: Option<f64>, steps: f64) {
         self.reversals += 1.0;
-        self.sum += fit.lost_motion;
-        self.squares += fit.lost_motion * fit.lost_motion;
-        self.variances += fit.variance;
-        self.clearance += fit.clearance;
-        self.windup += fit.windup;
-        self.held += fit.held;
-        self.stiffness += fit.stiffness;
+        self.straight.add(fit.lost_motion, fit.variance, fit.clearance, fit.held, fit.stiffness);
+        match &fit.rounded {
+            // Of the way to the clearance the table gives back what it took.
+            Some(r) => {
+                let held = fit.held * fit.stiffness / r.stiffness;
+                self.rounded.add(r.lost_motion, r.variance, r.clearance, held, r.stiffness);
+            }
+            None => self.rounded.add(fit.lost_motion, fit.variance, fit.clearance, fit.held, fit.stiffness),
+        }
+        self.give.add(fit);
         self.stiffness_variance += fit.stiffness_error * fit.stiffness_error;
         self.sliding += 0.5 * (levels.after - levels.before);
         self.motor += levels.motor;
@@ -163,34 +188,38 @@ impl Sense {
         self.reversals
     }
 
-    /// Variance of the mean lost motion, mm², from scatter and fits.
-    fn variance_of_mean(&self) -> f64 {
-        let n = self.reversals.max(1.0);
-        let expected = self.variances / n;
-        let seen = if n > 1.0 { ((self.squares - self.sum * self.sum / n) / (n - 1.0)).max(0.0) } else { 0.0 };
-        expected.max(seen) / n
+    fn values(&self, told: bool) -> &Values {
+        if told { &self.rounded } else { &self.straight }
     }
 
-    /// The estimate for this sense; `other` supplies the wind-up held on the far side at standstill.
-    fn estimate(&self, plan: &Plan, encoder: f64, other: &Sense) -> BacklashEstimate {
+    /// Variance of the mean lost motion, mm², from scatter and fits.
+    fn variance_of_mean(&self, told: bool) -> f64 {
+        let values = self.values(told);
+        variance_of_mean(self.reversals, values.sum, values.squares, values.variances)
+    }
+
+    /// The estimate for this sense; `other` supplies the wind-up held on the far side at standstill. `told`: the table's
+    /// presliding is taken off; `common` is the variance of what all reversals have alike.
+    fn estimate(&self, plan: &Plan, told: bool, common: f64, other: &Sense) -> BacklashEstimate {
         let n = self.reversals.max(1.0);
-        let far = if other.reversals > 0.0 { other.held / other.reversals } else { self.held / n };
-        let clearance = self.clearance / n;
+        let values = self.values(told);
+        let far = if other.reversals > 0.0 { other.values(told).held / other.reversals } else { values.held / n };
+        let clearance = values.clearance / n;
         let um = 1e3;
         let nm = plan.torque_nm;
         BacklashEstimate {
-            lost_motion_um: self.sum / n * um,
-            uncertainty_um: 2.0 * (self.variance_of_mean() + systematic(plan, encoder, self.sum / n)).sqrt() * um,
+            lost_motion_um: values.sum / n * um,
+            uncertainty_um: 2.0 * (self.variance_of_mean(told) + common).sqrt() * um,
             clearance_um: clearance * um,
-            windup_um: self.windup / n * um,
-            standstill_um: (clearance + self.held / n + far) * um,
+            windup_um: values.windup / n * um,
+            standstill_um: (clearance + values.held / n + far) * um,
             spread_um: if n > 1.0 {
-                ((self.squares - self.sum * self.sum / n) / (n - 1.0)).max(0.0).sqrt() * um
+                ((values.squares - values.sum * values.sum / n) / (n - 1.0)).max(0.0).sqrt() * um
             } else {
                 0.0
             },
             peak_um: if self.peaks > 0.0 { self.peak_sum / self.peaks * um } else { 0.0 },
-            stiffness_nm_mm: self.stiffness / n * nm,
+            stiffness_nm_mm: values.stiffness / n * nm,
             stiffness_error_nm_mm: self.stiffness_variance.sqrt() / n * nm,
             sliding_nm: self.sliding / n * nm,
             motor_friction_nm: self.motor / n * nm,
@@ -203,33 +232,41 @@ impl Sense {
     }
 }
 
-/// Variance that no repetition takes away, mm²: each end of the lost motion lies somewhere on the encoder's grid q,
-/// the same in every repeat (2·q²/12), a kink somewhere in its bin of the curve, and in step mode a motor with friction
-/// of its own sticks somewhere in its step when the torque is read (step²/12), and does so alike in every repeat. And a real curve
-/// is not quite the model's: creep, damping and a servo that swings bend it by a share of `lost_motion` (mm).
-fn systematic(plan: &Plan, encoder: f64, lost_motion: f64) -> f64 {
-    /// Standard deviation of that: on random axes 95 of 100 intervals hold with it, and 88 without.
-    const BENT: f64 = 0.005;
-    let step = if plan.slow_feed { 0.0 } else { plan.step };
-    let bent = BENT * lost_motion;
-    encoder * encoder / 6.0 + plan.bin * plan.bin / 24.0 + step * step / 12.0 + bent * bent
+/// What all reversals so far say.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Estimates {
+    /// A sense that was not measured is all zero.
+    pub each: [BacklashEstimate; 2],
+    /// Mean of both, or the one.
+    pub mean: BacklashEstimate,
+    /// The table's presliding that was taken off, in ‰ of the mean's lost motion; 0 where none shows.
+    pub presliding_permille: i32,
 }
 
 /// Estimates of both senses and their mean; a sense that was not measured is all zero.
 #[must_use]
-pub fn estimates(plan: &Plan, encoder: f64, senses: &[Sense; 2]) -> ([BacklashEstimate; 2], BacklashEstimate) {
-    let first = senses[0].estimate(plan, encoder, &senses[1]);
+pub fn estimates(plan: &Plan, encoder: f64, senses: &[Sense; 2]) -> Estimates {
+    let give = senses[0].give.with(&senses[1].give);
+    let reversals = (senses[0].reversals + senses[1].reversals).max(1.0);
+    let straight = (senses[0].straight.sum + senses[1].straight.sum) / reversals;
+    let step = if plan.slow_feed { 0.0 } else { plan.step };
+    let grid = systematic(encoder, plan.bin, step, 0.0);
+    let told = give.told(grid);
+    let common = systematic(encoder, plan.bin, step, straight) + give.untold(grid);
+    let permille =
+        if told { (1e3 * give.mean() / (straight - give.mean()).max(f64::MIN_POSITIVE)).min(1e6) } else { 0.0 };
+    let presliding_permille = (permille + 0.5) as i32;
+    let first = senses[0].estimate(plan, told, common, &senses[1]);
     if plan.senses == 1 {
-        return ([first, BacklashEstimate::default()], first);
+        return Estimates { each: [first, BacklashEstimate::default()], mean: first, presliding_permille };
     }
-    let second = senses[1].estimate(plan, encoder, &senses[0]);
+    let second = senses[1].estimate(plan, told, common, &senses[0]);
     let half = |a: f64, b: f64| 0.5 * (a + b);
     let root = |a: f64, b: f64| 0.5 * (a * a + b * b).sqrt();
-    let lost_motion = 1e-3 * half(first.lost_motion_um, second.lost_motion_um);
-    let scatter = 0.25 * (senses[0].variance_of_mean() + senses[1].variance_of_mean());
+    let scatter = 0.25 * (senses[0].variance_of_mean(told) + senses[1].variance_of_mean(told));
     let mean = BacklashEstimate {
         lost_motion_um: half(first.lost_motion_um, second.lost_motion_um),
-        uncertainty_um: 2.0e3 * (scatter + systematic(plan, encoder, lost_motion)).sqrt(),
+        uncertainty_um: 2.0e3 * (scatter + common).sqrt(),
         clearance_um: half(first.clearance_um, second.clearance_um),
         windup_um: half(first.windup_um, second.windup_um),
         standstill_um: half(first.standstill_um, second.standstill_um),
@@ -249,7 +286,7 @@ pub fn estimates(plan: &Plan, encoder: f64, senses: &[Sense; 2]) -> ([BacklashEs
         steps: first.steps + second.steps,
         structured: first.structured + second.structured,
     };
-    ([first, second], mean)
+    Estimates { each: [first, second], mean, presliding_permille }
 }
 
 /// Largest expanded uncertainty, as a share of the value, at which a compensation is still an improvement worth
@@ -259,21 +296,20 @@ const WORST_UNCERTAINTY: f64 = 0.33;
 /// (3 in 10 000).
 const DISAGREEMENT: f64 = 3.6;
 
-/// Says whether one reversal can be used.
+/// Says whether one reversal can be used; `torque_nm` is N·m in the unit of its torque.
 ///
 /// # Errors
 /// `GIB_ERR_BACKLASH_SHAPE`, `GIB_ERR_BACKLASH_NOISE`.
-pub fn check_reversal(fit: Option<&Fitted>) -> Result<Fitted, Fault> {
+pub fn check_reversal(fit: Option<&Fitted>, torque_nm: f64) -> Result<Fitted, Fault> {
     let Some(fit) = fit else { return Err(Fault::of(GIB_ERR_BACKLASH_SHAPE)) };
     // A slope that is not at least five standard errors from none cannot carry the wind-up.
     const SLOPE: f64 = 5.0;
     if fit.stiffness < SLOPE * fit.stiffness_error {
-        let found = fit.stiffness / fit.stiffness_error.max(f64::MIN_POSITIVE);
         return Err(Fault {
             code: GIB_ERR_BACKLASH_NOISE,
-            field: "torque\0",
-            value: found,
-            low: SLOPE,
+            field: "stiffness_nm_mm\0",
+            value: fit.stiffness * torque_nm,
+            low: SLOPE * fit.stiffness_error * torque_nm,
             high: f64::MAX,
         });
     }

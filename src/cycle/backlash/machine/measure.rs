@@ -297,21 +297,8 @@ impl Backlash {
         let (twice, twice_variance) = self.probe.difference();
         let change = self.after.mean() - self.before.mean();
         let motor = (0.5 * twice).max(0.0);
-        // More than half of the friction on the motor's side leaves too little wind-up to see; and a probe that
-        // cannot say is no probe; nor is one whose torque is the same all the way, there and back: it is stuck.
-        const LARGEST_SHARE: f64 = 0.55;
-        const WORST_ERROR: f64 = 0.1;
-        const STUCK: f64 = 1e-7;
-        let (share, error) = (2.0 * motor / change, twice_variance.sqrt());
-        let alive = twice.abs() > STUCK * change || error > STUCK * change;
-        if !(alive && share <= LARGEST_SHARE && error <= WORST_ERROR * change) {
-            return self.leave(Fault {
-                code: GIB_ERR_BACKLASH_MOTOR_FRICTION,
-                field: "torque\0",
-                value: share,
-                low: 0.0,
-                high: LARGEST_SHARE,
-            });
+        if let Err(fault) = self.probe.check(twice, twice_variance, change) {
+            return self.leave(fault);
         }
         self.levels = Levels {
             before: self.before.mean(),
@@ -342,7 +329,7 @@ impl Backlash {
     #[cold]
     fn conclude(&mut self) {
         let index = self.index;
-        let sound = verdict::check_reversal(self.fit.result()).and_then(|fitted| {
+        let sound = verdict::check_reversal(self.fit.result(), self.plan.torque_nm).and_then(|fitted| {
             verdict::check_motor(&fitted, &self.levels)?;
             verdict::check_load(&self.plan, &self.levels).map(|()| fitted)
         });
@@ -357,12 +344,13 @@ impl Backlash {
         self.output.progress_ratio = f64::from(self.reversal) / f64::from(all);
         let encoder = if self.plan.encoder > 0.0 { self.plan.encoder } else { self.smallest_change };
         let encoder = if encoder.is_finite() { encoder } else { 0.0 };
-        (self.estimates, self.mean) = verdict::estimates(&self.plan, encoder, &self.senses);
+        self.estimates = verdict::estimates(&self.plan, encoder, &self.senses);
         if self.reversal < all {
             return self.next_reversal();
         }
-        let amount = if self.plan.use_peak { self.mean.peak_um } else { self.mean.lost_motion_um };
-        if let Err(fault) = verdict::check_result(&self.plan, encoder, &self.estimates, &self.mean, amount) {
+        let (each, mean) = (&self.estimates.each, &self.estimates.mean);
+        let amount = if self.plan.use_peak { mean.peak_um } else { mean.lost_motion_um };
+        if let Err(fault) = verdict::check_result(&self.plan, encoder, each, mean, amount) {
             return self.leave(fault);
         }
         if self.plan.measure_only {

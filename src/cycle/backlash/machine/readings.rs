@@ -2,6 +2,7 @@
 
 use crate::cycle::backlash::curve::Moments;
 use crate::cycle::backlash::plan::Plan;
+use crate::error::{Fault, GIB_ERR_BACKLASH_MOTOR_FRICTION};
 
 /// Share of sliding at which the wind-up has certainly begun where nothing but friction loads the table, and how far up
 /// the one is that scales the probe.
@@ -139,6 +140,37 @@ impl Probe {
             let way = if forth { &mut self.forth } else { &mut self.back };
             *way = way.with(1.0, back, torque);
         }
+    }
+
+    /// Says whether the probe tells the motor's friction where the torque changes by `change` between sliding both ways: more than half
+    /// of the friction on the motor's side leaves too little wind-up to see; and a probe that cannot say is no probe; nor is
+    /// one whose torque is the same all the way, there and back: it is stuck.
+    ///
+    /// # Errors
+    /// `GIB_ERR_BACKLASH_MOTOR_FRICTION` with the readings of a way, or with what it found as a share of `change`.
+    pub(super) fn check(&self, twice: f64, variance: f64, change: f64) -> Result<(), Fault> {
+        const LARGEST_SHARE: f64 = 0.55;
+        const WORST_ERROR: f64 = 0.1;
+        const STUCK: f64 = 1e-7;
+        const FEWEST: f64 = 2.0;
+        let fault =
+            |field, value, low, high| Err(Fault { code: GIB_ERR_BACKLASH_MOTOR_FRICTION, field, value, low, high });
+        let readings = self.back.n.min(self.forth.n);
+        let (share, error) = (twice.max(0.0) / change, variance.sqrt() / change);
+        if readings < FEWEST || !error.is_finite() {
+            return fault("probe_readings\0", readings, readings.max(FEWEST) + 1.0, f64::MAX);
+        }
+        if error > WORST_ERROR {
+            return fault("motor_friction_error_ratio\0", error, 0.0, WORST_ERROR);
+        }
+        if share > LARGEST_SHARE {
+            return fault("motor_friction_ratio\0", share, 0.0, LARGEST_SHARE);
+        }
+        let alive = (twice / change).abs().max(error);
+        if alive <= STUCK {
+            return fault("probe_torque_ratio\0", alive, STUCK, f64::MAX);
+        }
+        Ok(())
     }
 
     /// Twice the motor's friction and its variance: the distance of two parallel lines, torque against way, one for

@@ -1,0 +1,278 @@
+//! How far the table itself gives way before it slides: presliding, told from the drive's spring by its rounding.
+//!
+//! Before break-away the table moves by µm, as its friction builds up. That travel is in series with the drive and makes the
+//! curve's stiffness too low, though (motor − table) does not change by it. But a spring stays straight and presliding
+//! bends, the more the nearer to sliding. With u the share of the way from sliding before to sliding after, the
+//! motor's travel from a kink is
+//!
+//! ```text
+//!   s = (τ − c)/k + q·(h(u) − h(u0)),   h(u) = 4·(1 − (1 − u)^¼),   u = (τ − before − 2·motor)/D
+//! ```
+//!
+//! which is Dahl's friction dF/dz ~ (1 − F)^n after a reversal, by Masing's rule, with n = ¾: q is D over the stiffness of the
+//! table's contact. The exponent of a table is not known: from 0.4 (a build-up that ends soon) up to any (one that hardly
+//! does) the truth departs from this middle by up to [`UNTOLD`] of what is taken off, to either side. A presliding that does
+//! not bend before it slides looks like the drive's spring in every respect, and nothing here finds it.
+//!
+//! The fit starts from the straight one of [`super::fit`] and takes its steps after Gauss and Newton, a few bins a slice.
+
+use super::cholesky::Cholesky;
+use super::curve::Curve;
+use super::fit::Levels;
+
+/// The straight fit: kinks, torque across the clearance, stiffness.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Line {
+    /// First kink, mm.
+    pub s1: f64,
+    /// Second kink, mm.
+    pub s2: f64,
+    /// Torque between them.
+    pub c: f64,
+    /// Stiffness.
+    pub k: f64,
+}
+
+/// What rounding says of the lost motion.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Rounded {
+    /// Lost motion of the rounded curve, mm.
+    pub lost_motion: f64,
+    /// Its variance, mm².
+    pub variance: f64,
+    /// The part of it that the curve leaves, without the levels' own.
+    pub fit_variance: f64,
+    /// Part of it that is clearance, mm.
+    pub clearance: f64,
+    /// Stiffness of the drive.
+    pub stiffness: f64,
+}
+
+/// Parameters: c, k, s1, s2, q.
+const PARAMETERS: usize = 5;
+/// Bins in one slice of a pass.
+const SLICE: usize = 3;
+/// Passes over the curve.
+const PASSES: u32 = 8;
+/// Share of the way to sliding beyond which the bend goes on straight.
+const STRAIGHT: f64 = 0.95;
+/// How far the truth may be from the rounded value, as a share of what rounding takes off, for any exponent from 0.4.
+pub const UNTOLD: f64 = 1.0;
+
+type Row = [f64; PARAMETERS];
+
+/// Sums of one pass over the curve.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    matrix: [Row; PARAMETERS],
+    right: Row,
+    squares: f64,
+    differences: f64,
+    count: f64,
+    last: f64,
+    /// Torque of the model at the bin before.
+    torque: f64,
+}
+
+/// The fit in progress.
+#[derive(Debug, Clone, Default)]
+pub struct Rounding {
+    levels: Levels,
+    change: f64,
+    least: f64,
+    largest: f64,
+    /// Too few bins in the clearance to see its level and width: they stay as they were.
+    tied: bool,
+    first: usize,
+    end: usize,
+    bin: usize,
+    passes: u32,
+    trial: Row,
+    step: Row,
+    sums: Sums,
+    best: Row,
+    best_sums: Sums,
+    found: Option<Rounded>,
+}
+
+/// h(u) and its slope.
+#[inline(always)]
+fn bend(u: f64) -> (f64, f64) {
+    let inner = u.clamp(-1.0, STRAIGHT);
+    let left = 1.0 - inner;
+    let fourth = left.sqrt().sqrt();
+    let slope = fourth / left;
+    (4.0 * (1.0 - fourth) + (u - inner) * slope, slope)
+}
+
+impl Rounding {
+    /// Begins with the straight fit over the bins `first..end`; `width` is that of a bin, mm.
+    pub fn start(&mut self, line: Line, levels: Levels, first: usize, end: usize, width: f64) {
+        self.levels = levels;
+        self.change = levels.spring_change();
+        self.tied = line.s2 - line.s1 < 2.5 * width;
+        (self.first, self.end) = (first, end);
+        self.least = 0.1 * line.k;
+        self.largest = 0.5 * (end - first) as f64 * width;
+        self.trial = [line.c, line.k, line.s1, line.s2, 0.0];
+        self.passes = 0;
+        self.found = None;
+        self.best_sums.squares = f64::INFINITY;
+        self.pass();
+    }
+
+    fn pass(&mut self) {
+        self.bin = self.first;
+        self.sums = Sums { torque: self.levels.before, ..Sums::default() };
+    }
+
+    /// Does one bounded slice of the work. Returns true once the result stands.
+    pub fn advance(&mut self, curve: &Curve) -> bool {
+        if self.bin < self.end {
+            let to = (self.bin + SLICE).min(self.end);
+            for bin in self.bin..to {
+                if let Some((n, s, torque)) = curve.point(bin) {
+                    self.add(n, s, torque);
+                }
+            }
+            self.bin = to;
+            return false;
+        }
+        self.passed()
+    }
+
+    /// Largest number of slices that it may take.
+    #[must_use]
+    pub const fn slices_bound(bins: usize) -> u32 {
+        PASSES * (bins / SLICE + 3) as u32
+    }
+
+    /// The result; `None` where the curve cannot tell.
+    #[must_use]
+    pub fn result(&self) -> Option<Rounded> {
+        self.found
+    }
+
+    fn share(&self, torque: f64) -> f64 {
+        (torque - self.levels.before - 2.0 * self.levels.motor) / self.change
+    }
+
+    /// Adds a bin: model and its gradient there.
+    #[inline(always)]
+    fn add(&mut self, n: f64, s: f64, torque: f64) {
+        let [c, k, s1, s2, q] = self.trial;
+        let release = s < s1;
+        let (mut model, mut gradient) = (c, [1.0, 0.0, 0.0, 0.0, 0.0]);
+        if release || s > s2 {
+            let (h0, slope0) = bend(self.share(c));
+            let way = if release { s - s1 } else { s - s2 };
+            // The torque rises from bin to bin, so that two steps from the last one suffice.
+            model = if release { self.sums.torque.min(c) } else { self.sums.torque.max(c) };
+            let (mut apart, mut slope) = (0.0, 1.0);
+            for _ in 0..3 {
+                let (h, bent) = bend(self.share(model));
+                apart = h - h0;
+                slope = 1.0 / k + q * bent / self.change;
+                model -= ((model - c) / k + q * apart - way) / slope;
+            }
+            self.sums.torque = model;
+            let kink = -1.0 / slope;
+            gradient =
+                [(1.0 / k + q * slope0 / self.change) / slope, (model - c) / (k * k) / slope, 0.0, 0.0, -apart / slope];
+            gradient[if release { 2 } else { 3 }] = kink;
+        }
+        let residual = torque - model;
+        let sums = &mut self.sums;
+        for (i, row) in sums.matrix.iter_mut().enumerate() {
+            let weighted = n * gradient[i];
+            sums.right[i] += weighted * residual;
+            for (cell, g) in row.iter_mut().zip(gradient).take(i + 1) {
+                *cell += weighted * g;
+            }
+        }
+        let residual = n.sqrt() * residual;
+        if sums.count > 0.0 {
+            sums.differences += (residual - sums.last) * (residual - sums.last);
+        }
+        sums.squares += residual * residual;
+        sums.count += 1.0;
+        sums.last = residual;
+    }
+
+    /// A pass has ended: the next step, or the result.
+    fn passed(&mut self) -> bool {
+        let gain = self.best_sums.squares - self.sums.squares;
+        let better = gain > 0.0;
+        let over = self.passes + 1 >= PASSES || (better && gain < 1e-4 * self.sums.squares);
+        self.passes += 1;
+        if better {
+            self.best = self.trial;
+            self.best_sums = self.sums;
+            match self.system() {
+                Some(system) => self.step = system.solve(self.sums.right),
+                None => return true,
+            }
+        } else if self.best_sums.squares.is_finite() {
+            self.step.iter_mut().for_each(|step| *step *= 0.5);
+        } else {
+            return true;
+        }
+        if over {
+            self.derive();
+            return true;
+        }
+        self.advance_parameters();
+        self.pass();
+        false
+    }
+
+    fn advance_parameters(&mut self) {
+        let mut next = self.best;
+        for (value, step) in next.iter_mut().zip(self.step) {
+            *value += step;
+        }
+        let largest = self.largest;
+        next[1] = next[1].max(self.least);
+        for i in 2..4 {
+            next[i] = self.best[i] + (next[i] - self.best[i]).clamp(-largest, largest);
+        }
+        if next[2] > next[3] {
+            let meet = 0.5 * (next[2] + next[3]);
+            (next[2], next[3]) = (meet, meet);
+        }
+        // Bent the other way the curve must still rise.
+        let bent = 0.8 * (1.0 - STRAIGHT) * self.change / next[1];
+        next[4] = next[4].max(-bent);
+        self.trial = next;
+    }
+
+    /// The normal equations. With a clearance too short to see, its width and level stand.
+    fn system(&self) -> Option<Cholesky<PARAMETERS>> {
+        let mut matrix = self.best_sums.matrix;
+        if self.tied {
+            let stiff = 1e3 * (matrix[2][2] + matrix[3][3]);
+            matrix[2][2] += stiff;
+            matrix[3][3] += stiff;
+            matrix[3][2] -= stiff;
+            matrix[0][0] += 1e3 * matrix[0][0];
+        }
+        Cholesky::new(matrix)
+    }
+
+    fn derive(&mut self) {
+        let [_, k, s1, s2, _] = self.best;
+        let Some(system) = self.system() else { return };
+        let sums = &self.best_sums;
+        let ratio = if sums.squares > 0.0 { sums.differences / sums.squares } else { 2.0 };
+        let correlation = (1.0 - 0.5 * ratio).clamp(0.0, 0.9);
+        let noise = sums.squares / (sums.count - PARAMETERS as f64).max(1.0);
+        let scale = noise * (1.0 + correlation) / (1.0 - correlation);
+        let gradient = [0.0, -self.change / (k * k), -1.0, 1.0, 0.0];
+        let fit_variance = scale * system.inverse_form(gradient);
+        let variance = fit_variance + self.levels.variance / (k * k);
+        let clearance = s2 - s1;
+        let lost_motion = clearance + self.change / k;
+        let sound = lost_motion.is_finite() && variance.is_finite() && variance >= 0.0;
+        self.found = sound.then_some(Rounded { lost_motion, variance, fit_variance, clearance, stiffness: k });
+    }
+}
