@@ -48,6 +48,11 @@ static void draw(backlash_adversary *a)
     c->clearance_mm = chance(&a->base, 0.2) ? 0.0 : over(&a->base, 0.003, 0.06);
     c->breakaway_ratio = between(&a->base, 1.0, 1.3);
     c->hold_ratio = between(&a->base, 0.5, 1.0);
+    if (chance(&a->base, 0.4)) {
+        double windup_mm = 2.0 * (1.0 - c->motor_share) * c->friction_nm / c->stiffness_nm_mm;
+        c->presliding_mm = over(&a->base, 0.005, 0.15) * windup_mm;
+        c->presliding_exponent = between(&a->base, 0.7, 1.5);
+    }
     c->viscous_nm_s_mm = chance(&a->base, 0.5) ? 0.0 : scale * over(&a->base, 0.001, 0.05);
     /* A load that the table's friction holds well, or one on which it hangs. */
     int hangs = chance(&a->base, 0.15);
@@ -307,7 +312,9 @@ static void see_value(backlash_adversary *a)
 {
     const gib_backlash_config *g = &a->config;
     gib_backlash_report *r = &a->report[a->base.run];
-    law(&a->base, gib_backlash_result(gib_of(a, 0), r) == GIB_OK && r->status == a->status[a->base.run], "a report of the end");
+    /* Who is switched off rests in the end, and the report keeps why the run ended. */
+    int switched_off = a->status[a->base.run] == GIB_OK && ever(&a->base, BACKLASH_SWITCHED_OFF);
+    law(&a->base, gib_backlash_result(gib_of(a, 0), r) == GIB_OK && (r->status == a->status[a->base.run] || (switched_off && r->status == GIB_ERR_DISABLED)), "a report of the end");
     if (a->status[a->base.run] != GIB_DONE) {
         law(&a->base, !r->written, "nothing written without an end");
         return;

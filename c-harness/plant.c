@@ -95,6 +95,20 @@ static void move(double *x, double *v, int *sticks, double force, double sliding
     *x += dt * faster;
 }
 
+/* The table on friction that gives way: each element is stretched by the way until it slips. */
+static void move_presliding(plant *p, double force, double sliding, double dt)
+{
+    const plant_config *c = &p->c;
+    double held = 0.0;
+    for (int i = 0; i < PLANT_ELEMENTS; i++) {
+        double slips = c->presliding_mm * pow((i + 0.5) / PLANT_ELEMENTS, c->presliding_exponent);
+        p->stretch[i] = fmin(fmax(p->stretch[i] + p->vy * dt / slips, -1.0), 1.0);
+        held += p->stretch[i] / PLANT_ELEMENTS;
+    }
+    p->vy += dt * (force - sliding * held) / c->table_inertia_nm_s2_mm;
+    p->y += dt * p->vy;
+}
+
 static void substep(plant *p, double torque_command, double dt)
 {
     const plant_config *c = &p->c;
@@ -107,6 +121,10 @@ static void substep(plant *p, double torque_command, double dt)
     double on_table = through - c->viscous_nm_s_mm * p->vy - c->constant_nm;
     move(&p->x, &p->vx, &p->motor_sticks, p->torque - through, motor_friction, motor_friction,
          c->motor_inertia_nm_s2_mm, dt);
+    if (c->presliding_mm > 0.0) {
+        move_presliding(p, on_table, table_friction, dt);
+        return;
+    }
     move(&p->y, &p->vy, &p->table_sticks, on_table, table_friction, c->breakaway_ratio * table_friction,
          c->table_inertia_nm_s2_mm, dt);
     /* Standing still, the table creeps until only part of the wind-up is held. */

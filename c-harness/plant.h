@@ -10,11 +10,16 @@
  *
  * Friction sticks: a body at rest stays there until the break-away torque is exceeded. While motor and table stand,
  * the table creeps until only `hold_ratio` of the sliding torque is held: the partial release of the wind-up.
+ *
+ * With `presliding_mm` the table's friction gives way before it slides: elements in parallel, each of which takes its share at the
+ * stiffness of its contact and slips on. There is no break-away above sliding then, and no creep.
  */
 #ifndef PLANT_H
 #define PLANT_H
 
 #include <stdint.h>
+
+enum { PLANT_ELEMENTS = 8 };
 
 typedef struct {
     double cycle_s;                /* servo period */
@@ -31,6 +36,8 @@ typedef struct {
     double constant_nm; /* constant torque on the table */
     double hold_ratio;  /* share of the wind-up held at standstill, 0 to 1; 1: no release */
     double hold_time_s;
+    double presliding_mm;       /* way at which the last element of the table's friction slips; 0: it does not give way */
+    double presliding_exponent; /* element i of N slips at presliding·((i + ½)/N)^exponent */
     double position_gain_1_s;
     double velocity_gain_nm_s_mm;
     double velocity_integral_time_s; /* 0: none */
@@ -48,6 +55,7 @@ typedef struct {
     plant_config c;
     double x, vx, y, vy; /* motor and table */
     int table_sticks, motor_sticks;
+    double stretch[PLANT_ELEMENTS]; /* of each element of the table's friction, as a share of where it slips */
     double torque; /* what the motor delivers */
     double integral, last_encoder, last_target;
     double command_sense; /* sense of the last commanded motion */

@@ -84,7 +84,7 @@ static void measures_and_writes(void **state)
         assert_int_equal(run(b), GIB_DONE);
         gib_backlash_report r = report_of(b);
         assert_true(fabs(r.mean.lost_motion_um - truth_um()) <= 1.0);
-        assert_true(r.mean.uncertainty_um > 0.02 && r.mean.uncertainty_um < 2.0);
+        assert_true(r.mean.uncertainty_um > 0.02 && r.mean.uncertainty_um < 4.0);
         assert_true(fabs(r.mean.clearance_um - 18.0) < 2.0 && fabs(r.mean.windup_um - 35.0) < 2.5);
         assert_true(fabs(r.mean.motor_friction_nm - 0.6) < 0.06 && fabs(r.mean.stiffness_nm_mm - 137.0) < 9.0);
         assert_true(r.mean.standstill_um < r.mean.lost_motion_um);
@@ -120,9 +120,45 @@ static void a_load_hides_no_clearance(void **state)
         gib_backlash_report r = report_of(b);
         double truth = plant_true_lost_motion_um(&axis);
         assert_true(fabs(r.mean.lost_motion_um - truth) <= 1.5 * r.mean.uncertainty_um);
-        assert_true(r.mean.uncertainty_um < 0.05 * truth && fabs(r.mean.clearance_um - 50.0) < 2.5);
+        assert_true(r.mean.uncertainty_um < 0.06 * truth && fabs(r.mean.clearance_um - 50.0) < 2.5);
         bench_free(b);
     }
+}
+
+/* The table's friction gives way before it slides: in series with the drive, so that a stiffness alone reads a longer lost motion. What
+ * bends shows and is taken off; how it bends is not known, and the uncertainty says so. The shapes are not the one that is fitted. */
+static void presliding_is_no_lost_motion(void **state)
+{
+    (void)state;
+    static const double WAYS_MM[] = {0.0005, 0.001, 0.003}, SHAPES[] = {0.7, 1.0, 1.5};
+    int held = 0, runs = 0, longer = 0, told = 0;
+    for (int i = 0; i < 36; i++) {
+        bench *b = bench_new();
+        plant_config axis = plant_default();
+        axis.presliding_mm = WAYS_MM[i % 3];
+        axis.presliding_exponent = SHAPES[i / 3 % 3];
+        axis.clearance_mm = i % 2 ? 0.018 : 0.0;
+        axis.torque_noise_nm = 0.03;
+        axis.seed = (uint64_t)i + 1;
+        plant_init(&b->axis, &axis);
+        gib_backlash_config c = quick_config();
+        c.mode = i / 18 ? GIB_BACKLASH_STEP : GIB_BACKLASH_SLOW_FEED;
+        c.repeats = 2;
+        assert_int_equal(gib_backlash_start(b->gib, &c), GIB_OK);
+        assert_int_equal(run(b), GIB_DONE);
+        gib_backlash_report r = report_of(b);
+        double error = r.mean.lost_motion_um - plant_true_lost_motion_um(&axis);
+        runs++;
+        held += fabs(error) <= r.mean.uncertainty_um;
+        longer += error > 0.0;
+        told += r.presliding_permille > 0;
+        print_message("presliding %.1f um ^%.1f clearance %2.0f mode %d: error %+.2f um, uncertainty %.2f, taken off %d permille\n",
+                      1e3 * axis.presliding_mm, axis.presliding_exponent, 1e3 * axis.clearance_mm, (int)c.mode, error,
+                      r.mean.uncertainty_um, (int)r.presliding_permille);
+        bench_free(b);
+    }
+    print_message("%d of %d intervals hold, %d read long, %d had something taken off\n", held, runs, longer, told);
+    assert_true(held >= 34 && told >= 20 && longer >= 7 && longer <= 29);
 }
 
 /* An axis that hangs on its drive never crosses the clearance: what it loses is the wind-up. In between one sense does not suffice. */
@@ -148,7 +184,7 @@ static void a_vertical_axis_is_measured(void **state)
         gib_backlash_report r = report_of(b);
         if (ends == GIB_DONE) {
             assert_true(fabs(r.mean.lost_motion_um - plant_true_lost_motion_um(&axis)) <= 1.5 * r.mean.uncertainty_um);
-            assert_true(r.mean.uncertainty_um < 2.0 && r.mean.clearance_um < 1.0);
+            assert_true(r.mean.uncertainty_um < 3.5 && r.mean.clearance_um < 1.0);
         } else {
             assert_true(b->axis.compensation_um == 7.0);
         }
@@ -270,9 +306,16 @@ static void switch_takes_compensation_out_and_back(void **state)
     run(b);
     run(b);
     assert_true(b->axis.compensation_um == 0.0 && b->axis.reversal_acceleration_on);
+    /* Why the measurement ended is told until the next start. */
+    gib_error_detail why;
+    assert_int_equal(gib_backlash_last_error(b->gib, &why), GIB_OK);
+    assert_true(why.code == GIB_ERR_DISABLED && report_of(b).status == GIB_ERR_DISABLED);
     assert_int_equal(gib_backlash_enable(b->gib, 1), GIB_OK);
     assert_int_equal(run(b), GIB_OK);
-    assert_true(fabs(b->axis.compensation_um - 7.0) < 1e-9);
+    assert_true(fabs(b->axis.compensation_um - 7.0) < 1e-9 && report_of(b).status == GIB_ERR_DISABLED);
+    assert_int_equal(gib_backlash_start(b->gib, &c), GIB_OK);
+    assert_int_equal(gib_backlash_last_error(b->gib, &why), GIB_OK);
+    assert_true(why.code == GIB_OK && report_of(b).status == GIB_BUSY);
     bench_free(b);
 }
 
@@ -408,6 +451,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(measures_and_writes),
         cmocka_unit_test(a_load_hides_no_clearance),
+        cmocka_unit_test(presliding_is_no_lost_motion),
         cmocka_unit_test(a_vertical_axis_is_measured),
         cmocka_unit_test(curve_is_readable),
         cmocka_unit_test(measure_only_writes_nothing),

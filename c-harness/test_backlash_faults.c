@@ -135,10 +135,12 @@ static int follow(rig *r, enum fault fault, size_t size, const void *saved)
             fail_msg("%s in phase %d: still busy after %d cycles", EXPECTED[fault].name, phase, cycles);
         }
     } while (status == GIB_BUSY);
-    if (fault == FROZEN_ENCODER && status != GIB_ERR_LAG) {
+    /* In the probe, which goes slowly, the command has gone its way before it is that far from the axis. */
+    int32_t other = phase == GIB_BACKLASH_PROBE ? GIB_ERR_BACKLASH_MOTOR_FRICTION : GIB_ERR_LAG;
+    if (fault == FROZEN_ENCODER && status != GIB_ERR_LAG && status != other) {
         return 0; /* the axis stood anyway, and was asked for nothing that needed it to move */
     }
-    if (status != EXPECTED[fault].code) {
+    if (status != EXPECTED[fault].code && !(fault == FROZEN_ENCODER && status == other)) {
         fail_msg("%s in phase %d: ended with %s", EXPECTED[fault].name, phase, gib_status_text(status));
     }
     assert_int_equal(fork.k.out.phase, GIB_BACKLASH_FAILED);

@@ -1661,7 +1661,9 @@ typedef struct gib_backlash_estimate {
      */
     double lost_motion_um;
     /**
-     * Its expanded uncertainty, k = 2.
+     * Its expanded uncertainty, k = 2. It holds what the table's presliding may be: where its bend shows, all that was taken
+     * off once more, since how it bends is not known; where none shows, what noise may hide. A table whose friction gives way along
+     * a straight line until it slides looks like the drive's spring: nothing here finds that.
      */
     double uncertainty_um;
     /**
@@ -1747,7 +1749,7 @@ typedef struct gib_backlash_report {
      */
     double value_active_um;
     /**
-     * `GIB_DONE`, `GIB_BUSY`, `GIB_OK` before a start, or the first error.
+     * `GIB_DONE`, `GIB_BUSY`, `GIB_OK` before a start, or the first error, also once an operator's wish was carried out since.
      */
     int32_t status;
     /**
@@ -1767,9 +1769,10 @@ typedef struct gib_backlash_report {
      */
     int32_t restore_owed;
     /**
-     * Zero.
+     * Travel of the table itself before it slides that showed in the rounding of the curves and was taken off the lost
+     * motion, in ‰ of the mean's lost motion; 0 where none shows beyond chance.
      */
-    int32_t reserved;
+    int32_t presliding_permille;
 } gib_backlash_report;
 
 /**
@@ -4489,7 +4492,7 @@ const char *gib_status_text(int32_t status);
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
  *
- * @return the size in bytes, about 106 KiB.
+ * @return the size in bytes, about 107 KiB.
  *
  * [thread: any] [real-time: yes] [state: any]
  */
@@ -4563,7 +4566,8 @@ int32_t gib_backlash_start(struct gib_backlash *handle,
  * @param handle the instance.
  * @param input measured values of this cycle.
  * @param output commands for this cycle; always written when not NULL.
- * @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
+ * @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start; carrying out
+ * `gib_backlash_restore` or `_enable` takes its place, and `gib_backlash_last_error` and the report still tell it:
  * GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_ACK_TIMEOUT, GIB_ERR_TORQUE_BOUND,
  * GIB_ERR_TRAVEL_BOUND, GIB_ERR_DEADLINE, GIB_ERR_LAG, GIB_ERR_CONFIG, GIB_ERR_DISABLED, GIB_ERR_BACKLASH_...;
  * and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
@@ -4682,8 +4686,9 @@ int32_t gib_backlash_compare(struct gib_backlash *handle,
                              struct gib_backlash_comparison *comparison);
 
 /**
- * The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
- * GIB_ERR_STATE changes nothing here.
+ * The first error of the present run, kept until the next start, or why the last call was refused: code, field, value and the
+ * bounds that it lies outside of. The field is one of the configuration or of the input, or says what was found (`_ratio`, `_share`
+ * and others by their unit). A call refused with GIB_ERR_STATE changes nothing here.
  *
  * @param handle the instance.
  * @param detail receives it; its `code` is GIB_OK when nothing went wrong.

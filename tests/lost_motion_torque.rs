@@ -311,7 +311,7 @@ fn fast_reversals_beside_slow_ones_do_not_spoil_them() {
     assert!(recording.exists());
     let ([truth, _], [value, uncertainty]) = (lost("positions"), lost("torque"));
     println!("the table lost {truth:.2} µm; from torque {value:.2} ± {uncertainty:.2} µm");
-    assert!((value - truth).abs() < uncertainty && uncertainty < 0.02 * truth);
+    assert!((value - truth).abs() < uncertainty && uncertainty < 0.08 * truth);
 }
 
 #[test]

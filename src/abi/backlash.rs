@@ -52,7 +52,7 @@ fn refusable(handle: &mut GibBacklash, call: impl FnOnce(&mut Backlash) -> Resul
 
 /// Bytes that an instance needs in memory of your own, to be aligned to 16.
 ///
-/// @return the size in bytes, about 106 KiB.
+/// @return the size in bytes, about 107 KiB.
 ///
 /// [thread: any] [real-time: yes] [state: any]
 #[unsafe(no_mangle)]
@@ -138,7 +138,8 @@ pub unsafe extern "C" fn gib_backlash_start(handle: *mut GibBacklash, config: *c
 /// @param handle the instance.
 /// @param input measured values of this cycle.
 /// @param output commands for this cycle; always written when not NULL.
-/// @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
+/// @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start; carrying out
+/// `gib_backlash_restore` or `_enable` takes its place, and `gib_backlash_last_error` and the report still tell it:
 /// GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_ACK_TIMEOUT, GIB_ERR_TORQUE_BOUND,
 /// GIB_ERR_TRAVEL_BOUND, GIB_ERR_DEADLINE, GIB_ERR_LAG, GIB_ERR_CONFIG, GIB_ERR_DISABLED, GIB_ERR_BACKLASH_...;
 /// and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
@@ -385,8 +386,9 @@ pub unsafe extern "C" fn gib_backlash_compare(
     })
 }
 
-/// The first error of the present run, or why the last call was refused: code, field, value and bounds. A call refused with
-/// GIB_ERR_STATE changes nothing here.
+/// The first error of the present run, kept until the next start, or why the last call was refused: code, field, value and the
+/// bounds that it lies outside of. The field is one of the configuration or of the input, or says what was found (`_ratio`, `_share`
+/// and others by their unit). A call refused with GIB_ERR_STATE changes nothing here.
 ///
 /// @param handle the instance.
 /// @param detail receives it; its `code` is GIB_OK when nothing went wrong.

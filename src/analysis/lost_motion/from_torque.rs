@@ -99,7 +99,8 @@ pub fn estimate(recording: &Recording, channel: &str, model: Option<&Axis>) -> R
         return Err(Refusal::NoCurve(turns.iter().map(Turn::why).collect()));
     };
     let (friction, source) = motor_friction(&pieces, &turns, about);
-    let fits: Vec<Result<Fitted, String>> = turns.iter().map(|turn| turn.with(&friction)).collect();
+    let mut fits: Vec<Result<Fitted, String>> = turns.iter().map(|turn| turn.with(&friction)).collect();
+    leave_out_unclear(&mut fits);
     let mut give = Give::default();
     fits.iter().flatten().for_each(|fitted| give.add(fitted));
     let resolution = pieces.iter().map(|piece| piece.resolution).fold(0.0, f64::max);
@@ -126,8 +127,8 @@ pub fn estimate(recording: &Recording, channel: &str, model: Option<&Axis>) -> R
 
 /// An unbroken piece of the recording, with the effort in the place of the difference.
 pub(super) struct Piece {
-    track: Track,
-    pub(super) sweeps: Vec<Sweep>,
+    pub(super) track: Track,
+    sweeps: Vec<Sweep>,
     rows: Vec<usize>,
     resolution: f64,
 }
@@ -255,7 +256,9 @@ fn steady(sweep: &Sweep) -> Option<Mean> {
 }
 
 /// Bins over the way to sliding. The fit leaves out the first two, in which the motor's own friction turns round.
-const BINS: f64 = 60.0;
+const BINS: f64 = 120.0;
+/// Share of the way to the first kink in which it turns round at most, where these bins are fine.
+const TURNED: f64 = 0.3;
 
 /// Sets aside reversals at much more than the slowest speed at which one shows lost motion: there the torque also moves masses.
 fn leave_out_fast(turns: &mut [Turn]) {
@@ -263,6 +266,17 @@ fn leave_out_fast(turns: &mut [Turn]) {
         turns.iter().filter(|turn| turn.fit(0.0, 0.0).is_ok()).map(|turn| turn.speed).fold(f64::INFINITY, f64::min);
     for turn in turns.iter_mut().filter(|turn| turn.speed > SPEED_RATIO * slowest) {
         turn.levels = Err("much faster than the slowest reversal".into());
+    }
+}
+
+/// Sets aside reversals that say little beside the clearest one: a mean that counts all alike would be theirs.
+fn leave_out_unclear(fits: &mut [Result<Fitted, String>]) {
+    const TIMES: f64 = 4.0;
+    const SHARE: f64 = 0.03;
+    let clearest = fits.iter().flatten().map(|fit| fit.variance.sqrt()).fold(f64::INFINITY, f64::min);
+    let unclear = |fit: &Fitted| fit.variance.sqrt() > (TIMES * clearest).max(SHARE * fit.lost_motion);
+    for fit in fits.iter_mut().filter(|fit| fit.as_ref().is_ok_and(unclear)) {
+        *fit = Err("says much less than the clearest reversal".into());
     }
 }
 
@@ -300,7 +314,7 @@ impl Turn {
         }
         let variance = before.error.powi(2) + after.error.powi(2) + (2.0 * motor_error).powi(2);
         let mut fit = Box::new(Fit::default());
-        fit.start(Levels { before: before.value, after: after.value, motor, variance });
+        fit.start(Levels { before: before.value, after: after.value, motor, variance }, TURNED);
         for _ in 0..=Fit::slices_bound() {
             if fit.advance(&curve) {
                 break;

@@ -62,12 +62,15 @@ fn mean_of(values: &[f64]) -> Option<(f64, f64)> {
 /// The motor's friction from each short way back and forth: half the distance of two parallel lines of effort over position.
 fn probes(piece: &Piece, about: f64) -> Vec<f64> {
     const FEWEST_ROWS: usize = 10;
+    // A way forth ends before the place where the motor turned, and has begun when it moves fast enough to count.
+    const SHARED: f64 = 0.6;
+    // A wiggle as the motor comes to rest turns no friction round.
+    const WIGGLE: f64 = 0.1;
     let one = |ways: &[Sweep]| {
         let [into, ends @ ..] = ways else { return None };
         // Only the first way back, from where the table slid, and the way forth again: then the table has not moved between.
-        // A wiggle as the motor comes to rest turns no friction round.
-        let short = ends[0].way() < 0.6 * about && ends[0].way() > 0.1 * about && into.way() > 1.5 * ends[0].way();
-        if !short || ends[1].way() < 0.9 * ends[0].way() {
+        let short = ends[0].way() < 0.6 * about && into.way() > 1.5 * ends[0].way();
+        if !short || ends[1].way() < SHARED * ends[0].way() {
             return None;
         }
         let back: Vec<&Sample> = ends[0].moving.iter().collect();
@@ -82,7 +85,7 @@ fn probes(piece: &Piece, about: f64) -> Vec<f64> {
         }
         Some(0.5 * ends[1].direction * apart(&back, &forth))
     };
-    piece.sweeps.windows(3).filter_map(one).collect()
+    piece.track.sweeps_beyond(WIGGLE * about).windows(3).filter_map(one).collect()
 }
 
 /// How far the second line lies above the first, both with one slope.

@@ -55,6 +55,11 @@ impl Track {
         self.cut(smallest_travel(&self.motor))
     }
 
+    /// Cuts the track at turns of more than `travel`, and than noise and grid make by themselves.
+    pub fn sweeps_beyond(&self, travel: f64) -> Vec<Sweep> {
+        self.cut(smallest_travel(&self.motor).max(travel))
+    }
+
     /// Takes `inertia`·acceleration and `viscous`·speed, in effort per 1/s² and 1/s, off an effort that stands for the
     /// difference.
     pub fn take_off_motion(&mut self, inertia: f64, viscous: f64) {

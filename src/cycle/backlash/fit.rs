@@ -135,6 +135,7 @@ enum Stage {
 pub struct Fit {
     stage: Stage,
     levels: Levels,
+    turned: f64,
     share: usize,
     first: usize,
     end: usize,
@@ -156,6 +157,7 @@ impl Default for Fit {
         Fit {
             stage: Stage::Done,
             levels: Levels::default(),
+            turned: 0.0,
             share: 0,
             first: 0,
             end: 0,
@@ -173,9 +175,11 @@ impl Default for Fit {
 }
 
 impl Fit {
-    /// Begins the fit of a curve whose levels are known.
-    pub fn start(&mut self, levels: Levels) {
+    /// Begins the fit of a curve whose levels are known. The rounded curve leaves out the share `turned` of the way to the first kink,
+    /// where the curve's bins are so fine that the motor's friction has not turned round in the first two.
+    pub fn start(&mut self, levels: Levels, turned: f64) {
         self.levels = levels;
+        self.turned = turned;
         self.share = 0;
         self.first = 0;
         self.ends = [usize::MAX; MARKS.len()];
@@ -446,8 +450,10 @@ impl Fit {
     fn round_off(&mut self, curve: &Curve) -> Stage {
         let end = self.ends.iter().filter(|end| **end != usize::MAX).max();
         let (Some(_), Some(end)) = (&self.chosen, end) else { return Stage::Done };
-        let width = curve.width_mm();
-        self.rounding.start(self.line, self.levels, self.first, (*end).min(curve.used()), width);
+        let (width, end) = (curve.width_mm(), (*end).min(curve.used()));
+        // The motor's own friction gives way too as it turns round, and would bend the beginning alike.
+        let turned = (self.turned * self.line.s1.max(0.0) * curve.bins_per_mm()) as usize;
+        self.rounding.start(self.line, self.levels, self.first.max(turned).min(end), end, width);
         Stage::Round
     }
 

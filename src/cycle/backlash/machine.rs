@@ -256,13 +256,15 @@ impl Backlash {
     #[must_use]
     pub fn report(&self) -> BacklashReport {
         let written = self.phase == Phase::Done && self.written_um.is_some();
+        // What an operator asked for afterwards does not make a run that failed a good one.
+        let failed = self.phase == Phase::Idle && self.fault != Fault::NONE;
         BacklashReport {
             each: self.estimates.each,
             mean: self.estimates.mean,
             old_value_um: self.old_um.filter(|_| written).unwrap_or(self.fallback_um),
             value_written_um: self.written_um.unwrap_or(0.0),
             value_active_um: self.active_um,
-            status: self.output.status,
+            status: if failed { self.fault.code } else { self.output.status },
             method: i32::from(self.plan.use_peak),
             mode: i32::from(!self.plan.slow_feed),
             written: i32::from(written),
@@ -313,7 +315,7 @@ impl Backlash {
         if let Some(fault) = danger {
             self.leave(fault);
         } else if self.left == 0 {
-            self.overdue();
+            self.overdue(input);
         } else {
             self.left -= 1;
             self.advance(input);
@@ -360,7 +362,6 @@ impl Backlash {
         }
         self.profile = Profile::at_rest(input.position_mm, self.plan.acceleration);
         self.fallback_um = input.compensation_um;
-        self.fault = Fault::NONE;
         let amount = match self.wish.take() {
             Some(Wish::RestoreOld) => self.old_um.unwrap_or(input.compensation_um),
             Some(Wish::Disable) => {
@@ -404,7 +405,7 @@ impl Backlash {
         if lag.abs() <= plan.lag_limit {
             return None;
         }
-        fault(GIB_ERR_LAG, "position_mm\0", lag, -plan.lag_limit, plan.lag_limit)
+        fault(GIB_ERR_LAG, "lag_mm\0", lag, -plan.lag_limit, plan.lag_limit)
     }
 
     /// Asks the kernel for a compensation amount and for reversal acceleration off, or as configured.

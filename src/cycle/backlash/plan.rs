@@ -157,7 +157,9 @@ impl Plan {
             },
             cycle_s: cycle,
             step: step_um * 1e-3,
-            bin: limit / (BINS - 1) as f64,
+            // Finer than half a step, or half a micrometre, the curve would show how the motor's own friction turns round and how its
+            // servo swings.
+            bin: (limit / (BINS - 1) as f64).max(0.5e-3 * step_um.min(1.0)),
             dwell: cycles(in_range("dwell_s\0", or(c.dwell_s, 0.02f64.max(2.0 * cycle)), 2.0 * cycle, 1.0)?),
             settle: cycles(in_range("settle_s\0", or(c.settle_s, 0.2), cycle, 10.0)?).max(CLEAR_SLICES + 1),
             feed: in_range("feed_mm_s\0", or(c.feed_mm_s, 0.1), 0.001, 5.0)? * cycle,

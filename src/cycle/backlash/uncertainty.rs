@@ -4,6 +4,9 @@
 use super::fit::Fitted;
 use super::rounding::UNTOLD;
 
+/// Standard deviations beyond which chance does not explain a rounding, and within which it may hide one.
+const SIGMAS: f64 = 2.0;
+
 /// By how much straight fits read longer than rounded ones: what the table itself may have given way.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Give {
@@ -50,18 +53,19 @@ impl Give {
     /// Whether the table gives way beyond what chance shows, so that the rounded value is nearer to the truth.
     #[must_use]
     pub fn told(&self, grid: f64) -> bool {
-        const SIGMAS: f64 = 2.0;
         self.mean() > SIGMAS * self.variance(grid).sqrt()
     }
 
-    /// Variance of what is not known of it, mm²: the shape of its bend where it is taken off, else all of it.
+    /// Variance of what is not known of it, mm²: the shape of its bend where it is taken off, else all that chance may hide. A
+    /// table gives way by 0 or more: what was found below 0 is chance, and leaves little room above.
     #[must_use]
     pub fn untold(&self, grid: f64) -> f64 {
         let squared = self.mean() * self.mean();
         if self.told(grid) {
             (0.5 * UNTOLD).powi(2) * squared
         } else {
-            (0.5 + 0.5 * UNTOLD).powi(2) * (squared + self.variance(grid))
+            let sigma = self.variance(grid).sqrt();
+            (0.5 * (self.mean() + SIGMAS * sigma).max(sigma)).powi(2)
         }
     }
 }

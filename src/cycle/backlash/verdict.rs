@@ -18,7 +18,9 @@ use crate::error::{
 pub struct BacklashEstimate {
     /// Lost motion between steady slow motion one way and the other: clearance + 2·Ts/k.
     pub lost_motion_um: f64,
-    /// Its expanded uncertainty, k = 2.
+    /// Its expanded uncertainty, k = 2. It holds what the table's presliding may be: where its bend shows, all that was taken
+    /// off once more, since how it bends is not known; where none shows, what noise may hide. A table whose friction gives way along
+    /// a straight line until it slides looks like the drive's spring: nothing here finds that.
     pub uncertainty_um: f64,
     /// Part of it that is clearance.
     pub clearance_um: f64,
@@ -64,7 +66,7 @@ pub struct BacklashReport {
     pub value_written_um: f64,
     /// Amount that the kernel reported in force at the last confirmed request, µm.
     pub value_active_um: f64,
-    /// `GIB_DONE`, `GIB_BUSY`, `GIB_OK` before a start, or the first error.
+    /// `GIB_DONE`, `GIB_BUSY`, `GIB_OK` before a start, or the first error, also once an operator's wish was carried out since.
     pub status: i32,
     /// `GIB_BACKLASH_FIT` or `GIB_BACKLASH_PEAK`: which estimate is written.
     pub method: i32,
@@ -317,11 +319,12 @@ pub fn check_reversal(fit: Option<&Fitted>, torque_nm: f64) -> Result<Fitted, Fa
 }
 
 /// Says whether curve and probe found the same friction on the motor's side: across a clearance the motor has nothing else to
-/// overcome, but for the zero of the torque reading, which the middle of the sliding levels bounds.
+/// overcome, but for the zero of the torque reading, which the middle of the sliding levels bounds. `torque_nm` is N·m in the
+/// unit of their torque.
 ///
 /// # Errors
 /// `GIB_ERR_BACKLASH_MOTOR_FRICTION` with how far the two are apart.
-pub fn check_motor(fit: &Fitted, levels: &Levels) -> Result<(), Fault> {
+pub fn check_motor(fit: &Fitted, levels: &Levels, torque_nm: f64) -> Result<(), Fault> {
     /// Share of the wind-up from which a clearance shows a level of its own, and share of sliding that is the same.
     const CLEAR: f64 = 0.25;
     const SAME: f64 = 0.1;
@@ -330,8 +333,8 @@ pub fn check_motor(fit: &Fitted, levels: &Levels) -> Result<(), Fault> {
     let chance = (fit.level_error * fit.level_error + 0.25 * levels.variance).sqrt();
     let allowed = same + (0.5 * (levels.after + levels.before).abs()).min(same) + DISAGREEMENT * chance;
     if fit.clearance > CLEAR * fit.windup && apart > allowed {
-        let (code, field) = (GIB_ERR_BACKLASH_MOTOR_FRICTION, "torque\0");
-        return Err(Fault { code, field, value: apart, low: 0.0, high: allowed });
+        let (code, field) = (GIB_ERR_BACKLASH_MOTOR_FRICTION, "motor_friction_difference_nm\0");
+        return Err(Fault { code, field, value: apart * torque_nm, low: 0.0, high: allowed * torque_nm });
     }
     Ok(())
 }
@@ -346,7 +349,7 @@ pub fn check_load(plan: &Plan, levels: &Levels) -> Result<(), Fault> {
     const FALLS: f64 = 1.1;
     let load = (levels.after + levels.before).abs() / levels.spring_change();
     if plan.senses == 1 && load > HELD && load < FALLS {
-        let (code, field) = (GIB_ERR_BACKLASH_SHAPE, "one_direction\0");
+        let (code, field) = (GIB_ERR_BACKLASH_SHAPE, "load_ratio\0");
         return Err(Fault { code, field, value: load, low: 0.0, high: HELD });
     }
     Ok(())
@@ -377,11 +380,11 @@ pub fn check_result(
         let apart = (each[0].lost_motion_um - each[1].lost_motion_um).abs();
         let allowed = 0.5 * DISAGREEMENT * (each[0].uncertainty_um.powi(2) + each[1].uncertainty_um.powi(2)).sqrt();
         if apart > allowed {
-            return fault(GIB_ERR_BACKLASH_DIRECTIONS, "lost_motion_um\0", apart, 0.0, allowed);
+            return fault(GIB_ERR_BACKLASH_DIRECTIONS, "lost_motion_difference_um\0", apart, 0.0, allowed);
         }
     }
     if !(amount_um > 0.0 && amount_um <= plan.compensation_max_um) {
-        return fault(GIB_ERR_BACKLASH_LIMIT, "compensation_max_um\0", amount_um, 0.0, plan.compensation_max_um);
+        return fault(GIB_ERR_BACKLASH_LIMIT, "amount_um\0", amount_um, 0.0, plan.compensation_max_um);
     }
     Ok(())
 }

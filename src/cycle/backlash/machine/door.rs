@@ -5,16 +5,27 @@ use super::*;
 impl Backlash {
     /// A deadline has passed.
     #[cold]
-    pub(super) fn overdue(&mut self) {
+    pub(super) fn overdue(&mut self, input: &BacklashInput) {
         match self.phase {
             Phase::Restore => self.give_up(),
             Phase::Stopping => self.restore(),
             Phase::Clear | Phase::Write { .. } => {
-                let low = f64::from(self.output.request_id);
-                self.leave(Fault { code: GIB_ERR_ACK_TIMEOUT, field: "acknowledged_id\0", value: low, low, high: low });
+                self.leave(self.unconfirmed(input));
             }
             _ => self.leave(Fault { code: GIB_ERR_DEADLINE, field: "phase\0", ..Fault::NONE }),
         }
+    }
+
+    /// What of the present request the kernel has not confirmed: its number, or else the amount.
+    fn unconfirmed(&self, input: &BacklashInput) -> Fault {
+        let (answered, asked) = (f64::from(input.acknowledged_id), f64::from(self.output.request_id));
+        let (amount, wide) = (self.output.compensation_um, self.plan.compensation_tolerance_um);
+        let (field, value, low, high) = if answered == asked {
+            ("compensation_um\0", input.compensation_um, amount - wide, amount + wide)
+        } else {
+            ("acknowledged_id\0", answered, asked, asked)
+        };
+        Fault { code: GIB_ERR_ACK_TIMEOUT, field, value, low, high }
     }
 
     /// The one door out of a measurement: keeps the first fault, brakes, restores, fails.

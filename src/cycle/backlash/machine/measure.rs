@@ -146,24 +146,14 @@ impl Backlash {
         let change = self.after.mean() - self.before.mean();
         let error = (self.after.variance_of_mean() + self.before.variance_of_mean()).sqrt();
         const SIGMAS: f64 = 5.0;
+        let (field, nm) = ("sliding_change_nm\0", self.plan.torque_nm);
         if change.abs() <= SIGMAS * error || error.is_infinite() {
-            let fault = Fault {
-                code: GIB_ERR_BACKLASH_NOISE,
-                field: "torque\0",
-                value: change,
-                low: SIGMAS * error,
-                high: f64::MAX,
-            };
-            return self.leave(fault);
+            let (code, value, low) = (GIB_ERR_BACKLASH_NOISE, change.abs() * nm, SIGMAS * error * nm);
+            return self.leave(Fault { code, field, value, low, high: f64::MAX });
         }
         if change < 0.0 {
-            return self.leave(Fault {
-                code: GIB_ERR_BACKLASH_TORQUE_SIGN,
-                field: "torque\0",
-                value: change,
-                low: 0.0,
-                high: f64::MAX,
-            });
+            let (code, value) = (GIB_ERR_BACKLASH_TORQUE_SIGN, change * nm);
+            return self.leave(Fault { code, field, value, low: 0.0, high: f64::MAX });
         }
         let samples = f64::from(self.after.batches().max(1)) * f64::from(self.plan.batch);
         let noise = (self.after.variance_of_mean() * samples).sqrt();
@@ -219,8 +209,12 @@ impl Backlash {
         if found > low && travel < self.plan.limit {
             return self.probe_back(input);
         }
-        let code = if found > low { GIB_ERR_BACKLASH_LIMIT } else { GIB_ERR_BACKLASH_NO_RISE };
-        self.leave(Fault { code, field: "detection_limit_um\0", value: found, low, high: 1.0 });
+        self.leave(if found > low {
+            let (code, high) = (GIB_ERR_BACKLASH_LIMIT, 1e3 * self.plan.limit);
+            Fault { code, field: "travel_um\0", value: 1e3 * travel, low: 0.0, high }
+        } else {
+            Fault { code: GIB_ERR_BACKLASH_NO_RISE, field: "torque_share\0", value: found, low, high: f64::MAX }
+        });
     }
 
     /// Sliding is reached: will go back by a share of the way, where the table still sticks.
@@ -246,7 +240,7 @@ impl Backlash {
         if forth {
             let deepest = self.probe.deepest;
             if back > deepest {
-                let field = "position_mm\0";
+                let field = "probe_way_mm\0";
                 return self.leave(Fault {
                     code: GIB_ERR_BACKLASH_MOTOR_FRICTION,
                     field,
@@ -255,13 +249,26 @@ impl Backlash {
                     high: deepest,
                 });
             }
-            let goal = self.turn_command + self.sense * self.plan.reach();
-            self.move_to(Phase::ProbeForth, goal, self.plan.feed);
+            let goal = self.profile.position + self.sense * self.probe_way();
+            self.move_to(Phase::ProbeForth, goal, self.probe_feed());
         } else {
             self.probe.turn = input.position_mm;
-            let goal = self.turn_command - self.sense * self.plan.limit.min(self.plan.lag_limit);
-            self.move_to(Phase::ProbeBack, goal, self.plan.feed);
+            let goal = self.profile.position - self.sense * self.probe_way();
+            self.move_to(Phase::ProbeBack, goal, self.probe_feed());
         }
+    }
+
+    /// Furthest that the command goes for the motor to go its depth: a slow servo trails by many times that, a stuck motor by any.
+    fn probe_way(&self) -> f64 {
+        const TRAILS: f64 = 25.0;
+        self.plan.limit.min(self.plan.lag_limit).min(TRAILS * self.probe.depth)
+    }
+
+    /// Speed of the probe, mm per cycle. A servo that integrates trails a motor that winds a spring by about the way of one
+    /// integral time, and as its command is brought back the motor springs forth by as much: the probe's way must take longer.
+    fn probe_feed(&self) -> f64 {
+        const WAY_S: f64 = 0.5;
+        self.plan.feed.min(self.probe.depth / (WAY_S * self.plan.cycles_per_s))
     }
 
     /// One cycle of the probe. Friction on the motor's side is half the difference of the torque both ways at the
@@ -281,8 +288,11 @@ impl Backlash {
     #[cold]
     fn end_probe(&mut self, input: &BacklashInput, back: f64, over: bool) {
         if over {
-            let (field, high) = ("position_mm\0", self.probe.depth);
-            self.leave(Fault { code: GIB_ERR_BACKLASH_MOTOR_FRICTION, field, value: back, low: 0.0, high });
+            // Back it did not get to its depth, or forth not near to where it turned.
+            let forth = self.phase == Phase::ProbeForth;
+            let (low, high) = if forth { (0.0, self.probe.near) } else { (self.probe.depth, f64::MAX) };
+            let (code, field) = (GIB_ERR_BACKLASH_MOTOR_FRICTION, "probe_way_mm\0");
+            self.leave(Fault { code, field, value: back, low, high });
         } else if self.phase == Phase::ProbeBack {
             self.unwind(input, true);
         } else {
@@ -318,7 +328,7 @@ impl Backlash {
             }
         }
         if bin + PEAK_SLICE >= curve.used() {
-            self.fit.start(self.levels);
+            self.fit.start(self.levels, 0.0);
             self.enter(Phase::EvaluateFit, f64::from(Fit::slices_bound()));
         } else {
             self.phase = Phase::EvaluatePeak { bin: bin + PEAK_SLICE };
@@ -330,7 +340,7 @@ impl Backlash {
     fn conclude(&mut self) {
         let index = self.index;
         let sound = verdict::check_reversal(self.fit.result(), self.plan.torque_nm).and_then(|fitted| {
-            verdict::check_motor(&fitted, &self.levels)?;
+            verdict::check_motor(&fitted, &self.levels, self.plan.torque_nm)?;
             verdict::check_load(&self.plan, &self.levels).map(|()| fitted)
         });
         let fitted = match sound {
