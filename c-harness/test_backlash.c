@@ -150,15 +150,16 @@ static void presliding_is_no_lost_motion(void **state)
         double error = r.mean.lost_motion_um - plant_true_lost_motion_um(&axis);
         runs++;
         held += fabs(error) <= r.mean.uncertainty_um;
-        longer += error > 0.0;
+        longer += c.mode == GIB_BACKLASH_SLOW_FEED && error > 0.0;
         told += r.presliding_permille > 0;
         print_message("presliding %.1f um ^%.1f clearance %2.0f mode %d: error %+.2f um, uncertainty %.2f, taken off %d permille\n",
                       1e3 * axis.presliding_mm, axis.presliding_exponent, 1e3 * axis.clearance_mm, (int)c.mode, error,
                       r.mean.uncertainty_um, (int)r.presliding_permille);
         bench_free(b);
     }
-    print_message("%d of %d intervals hold, %d read long, %d had something taken off\n", held, runs, longer, told);
-    assert_true(held >= 34 && told >= 20 && longer >= 7 && longer <= 29);
+    print_message("%d of %d intervals hold, %d fed slowly read long, %d had something taken off\n", held, runs, longer, told);
+    /* In steps a table that creeps looks the same: nothing is taken off, the uncertainty holds it. */
+    assert_true(held >= 33 && told >= 15 && told <= 18 && longer >= 3 && longer <= 15);
 }
 
 /* An axis that hangs on its drive never crosses the clearance: what it loses is the wind-up. In between one sense does not suffice. */

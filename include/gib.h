@@ -1770,7 +1770,8 @@ typedef struct gib_backlash_report {
     int32_t restore_owed;
     /**
      * Travel of the table itself before it slides that showed in the rounding of the curves and was taken off the lost
-     * motion, in ‰ of the mean's lost motion; 0 where none shows beyond chance.
+     * motion, in ‰ of the mean's lost motion; 0 where none shows beyond chance, and always with `GIB_BACKLASH_STEP`, where a table that
+     * creeps looks the same: there the uncertainty holds it.
      */
     int32_t presliding_permille;
 } gib_backlash_report;

@@ -107,8 +107,9 @@ pub fn estimate(recording: &Recording, channel: &str, model: Option<&Axis>) -> R
     let width = turns.iter().map(Turn::width).fold(0.0, f64::max);
     let told = give.told(systematic(resolution, width, 0.0, 0.0));
     turns.iter_mut().zip(fits).for_each(|(turn, fitted)| turn.finish(fitted, &friction, told));
-    let alike =
-        |lost: f64| systematic(resolution, width, 0.0, lost) + give.untold(systematic(resolution, width, 0.0, 0.0));
+    let alike = |lost: f64| {
+        systematic(resolution, width, 0.0, lost) + give.untold(systematic(resolution, width, 0.0, 0.0), told)
+    };
     let mean =
         joined(&turns, &friction, alike).ok_or_else(|| Refusal::NoCurve(turns.iter().map(Turn::why).collect()))?;
     let values: Vec<f64> = turns.iter().filter_map(|t| t.result.as_ref().ok()).map(|e| e.lost_motion.value).collect();

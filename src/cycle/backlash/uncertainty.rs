@@ -56,16 +56,17 @@ impl Give {
         self.mean() > SIGMAS * self.variance(grid).sqrt()
     }
 
-    /// Variance of what is not known of it, mm²: the shape of its bend where it is taken off, else all that chance may hide. A
+    /// Variance of what is not known of it, mm²: the shape of its bend where it is `told` and taken off, else all that chance may hide. A
     /// table gives way by 0 or more: what was found below 0 is chance, and leaves little room above.
     #[must_use]
-    pub fn untold(&self, grid: f64) -> f64 {
+    pub fn untold(&self, grid: f64, told: bool) -> f64 {
         let squared = self.mean() * self.mean();
-        if self.told(grid) {
+        if told {
             (0.5 * UNTOLD).powi(2) * squared
         } else {
             let sigma = self.variance(grid).sqrt();
-            (0.5 * (self.mean() + SIGMAS * sigma).max(sigma)).powi(2)
+            let most = (1.0 + 0.5 * UNTOLD) * self.mean();
+            (0.5 * (self.mean() + SIGMAS * sigma).max(sigma).max(most)).powi(2)
         }
     }
 }

@@ -77,7 +77,8 @@ pub struct BacklashReport {
     /// 1 while a restore is owed that the kernel has not confirmed.
     pub restore_owed: i32,
     /// Travel of the table itself before it slides that showed in the rounding of the curves and was taken off the lost
-    /// motion, in ‰ of the mean's lost motion; 0 where none shows beyond chance.
+    /// motion, in ‰ of the mean's lost motion; 0 where none shows beyond chance, and always with `GIB_BACKLASH_STEP`, where a table that
+    /// creeps looks the same: there the uncertainty holds it.
     pub presliding_permille: i32,
 }
 
@@ -253,8 +254,9 @@ pub fn estimates(plan: &Plan, encoder: f64, senses: &[Sense; 2]) -> Estimates {
     let straight = (senses[0].straight.sum + senses[1].straight.sum) / reversals;
     let step = if plan.slow_feed { 0.0 } else { plan.step };
     let grid = systematic(encoder, plan.bin, step, 0.0);
-    let told = give.told(grid);
-    let common = systematic(encoder, plan.bin, step, straight) + give.untold(grid);
+    // While the motor stands between steps the table creeps, which bends the curve as presliding does.
+    let told = plan.slow_feed && give.told(grid);
+    let common = systematic(encoder, plan.bin, step, straight) + give.untold(grid, told);
     let permille =
         if told { (1e3 * give.mean() / (straight - give.mean()).max(f64::MIN_POSITIVE)).min(1e6) } else { 0.0 };
     let presliding_permille = (permille + 0.5) as i32;
