@@ -43,7 +43,7 @@ pub(super) fn motor_friction(pieces: &[Piece], turns: &[Turn], about: f64) -> (F
         let fitted = turn.fit(0.0, 0.0).ok()?;
         let (before, after) = turn.levels.as_ref().ok()?;
         let wide = fitted.clearance > CLEARANCE_SHARE * fitted.lost_motion && fitted.clearance > 4.0 * turn.width();
-        wide.then(|| fitted.level - 0.5 * (before.value + after.value))
+        wide.then_some(fitted.level - 0.5 * (before.value + after.value))
     };
     let levels: Vec<f64> = turns.iter().filter_map(level).collect();
     match mean_of(&levels) {

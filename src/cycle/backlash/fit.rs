@@ -24,59 +24,8 @@
 
 use super::cholesky::Cholesky;
 use super::curve::{BINS, Curve, Moments};
-use super::rounding::{Line, Rounded, Rounding};
-
-/// What is known of a reversal besides its curve. Torques in the curve's unit and sense.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Levels {
-    /// Sliding torque before the reversal, in the new sense: negative for a healthy axis.
-    pub before: f64,
-    /// Sliding torque after the reversal: positive.
-    pub after: f64,
-    /// Friction on the motor's side, at least 0.
-    pub motor: f64,
-    /// Variance of D = after − before − 2·motor.
-    pub variance: f64,
-}
-
-impl Levels {
-    /// The change of the spring's torque between sliding one way and the other.
-    #[must_use]
-    pub fn spring_change(&self) -> f64 {
-        self.after - self.before - 2.0 * self.motor
-    }
-}
-
-/// The fitted curve and what follows from it. Lengths in mm, torques in the curve's unit.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Fitted {
-    /// Lost motion.
-    pub lost_motion: f64,
-    /// Its variance, mm².
-    pub variance: f64,
-    /// Clearance s2 − s1.
-    pub clearance: f64,
-    /// Elastic wind-up D/k.
-    pub windup: f64,
-    /// Travel from the reversal to the clearance: the wind-up that was still held at standstill.
-    pub held: f64,
-    /// Stiffness k.
-    pub stiffness: f64,
-    /// Standard error of k.
-    pub stiffness_error: f64,
-    /// Torque across the clearance.
-    pub level: f64,
-    /// Its standard error.
-    pub level_error: f64,
-    /// Standard deviation of one torque sample about the fitted curve.
-    pub noise: f64,
-    /// Share of the wind-up, from the clearance up, that was used.
-    pub share: f64,
-    /// True when residuals show structure at every share: the curve has not the expected shape.
-    pub structured: bool,
-    /// The same curve with the table's presliding; `None` where that cannot be told.
-    pub rounded: Option<Rounded>,
-}
+use super::fitted::{Fitted, Levels};
+use super::rounding::{Line, Rounding};
 
 /// Shares of the wind-up tried, largest first.
 const SHARES: [f64; 3] = [0.65, 0.5, 0.35];

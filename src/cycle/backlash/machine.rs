@@ -11,7 +11,8 @@
 //! that a kernel which comes back late still sees it.
 
 use super::curve::Curve;
-use super::fit::{Fit, Levels};
+use super::fit::Fit;
+use super::fitted::Levels;
 use super::io::*;
 use super::peak::Peak;
 use super::plan::Plan;

@@ -14,6 +14,7 @@
 //! | [`machine`] | the state machine called once per servo cycle |
 //! | [`curve`] | torque against travel |
 //! | [`fit`] (its normal equations in `cholesky`), [`peak`] | lost motion from a curve: ours and the published rule |
+//! | [`fitted`] | what a fit starts from, and what it finds |
 //! | [`rounding`] | the table's presliding, from the same curve |
 //! | [`uncertainty`] | what repeats, reversals alike and the shape of the presliding leave open |
 //! | [`verdict`] | means, uncertainty, and whether to trust them |
@@ -22,6 +23,7 @@ mod cholesky;
 pub mod config;
 pub mod curve;
 pub mod fit;
+pub mod fitted;
 pub mod io;
 pub mod machine;
 pub mod peak;

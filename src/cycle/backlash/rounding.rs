@@ -18,7 +18,7 @@
 
 use super::cholesky::Cholesky;
 use super::curve::Curve;
-use super::fit::Levels;
+use super::fitted::Levels;
 
 /// The straight fit: kinks, torque across the clearance, stiffness.
 #[derive(Debug, Clone, Copy, Default)]
@@ -234,7 +234,7 @@ impl Rounding {
         let largest = self.largest;
         next[1] = next[1].max(self.least);
         for i in 2..4 {
-            next[i] = self.best[i] + (next[i] - self.best[i]).clamp(-largest, largest);
+            next[i] = self.best[i] + (next[i] - self.best[i]).max(-largest).min(largest);
         }
         if next[2] > next[3] {
             let meet = 0.5 * (next[2] + next[3]);

@@ -1,7 +1,7 @@
 //! What is not known of a lost motion, for the cycle and for recordings alike: scatter, what every reversal has alike, and
 //! presliding of the table that is not told from the drive's spring.
 
-use super::fit::Fitted;
+use super::fitted::Fitted;
 use super::rounding::UNTOLD;
 
 /// Standard deviations beyond which chance does not explain a rounding, and within which it may hide one.

@@ -3,7 +3,7 @@
 //! The variance of a mean over n reversals is the larger of what the fits expect and what the repeats show
 //! (Birge's ratio), so that neither a lucky spread nor an optimistic fit makes the uncertainty too small.
 
-use super::fit::{Fitted, Levels};
+use super::fitted::{Fitted, Levels};
 use super::plan::Plan;
 use super::uncertainty::{Give, systematic, variance_of_mean};
 use crate::error::{
