@@ -7,11 +7,8 @@ use gib::plant::moves::{Moves, Reach};
 use gib::plant::simulate::{Sensors, Setup, simulate};
 use gib::recording::{Column, Recording};
 
-const RIG: &str = r#"{ "schema": "gib.machine/1", "name": "rig", "axes": [ {
-    "name": "x", "drive": "ball_screw", "lead_mm": 10.0, "inertia_kg_m2": 0.0028, "coulomb_friction_nm": 0.9,
-    "viscous_friction_nm_s": 0.008, "torque_limit_nm": 16.0,
-    "servo": { "period_s": 0.001, "position_gain_1_s": 40.0, "velocity_gain_nm_s": 0.528, "velocity_integral_time_s": 0.02,
-               "velocity_feedforward": 1.0, "torque_time_constant_s": 0.0005 } } ] }"#;
+/// What is believed of the rig of the demonstration.
+const RIG: &str = include_str!("../examples/machines/believed.json");
 
 fn rig(effects: &[Effect]) -> Axis {
     Machine::parse(RIG).unwrap().axes[0].with_effects(effects.to_vec())

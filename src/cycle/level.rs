@@ -4,6 +4,15 @@
 //! scatter of batch means: std(mean) = std(batch means)/√(batches). With batches much longer than the
 //! correlation this holds whatever the spectrum (method of batch means).
 
+/// By how much the variance of a fit exceeds that of independent readings where neighbours move together: (1 + ρ)/(1 − ρ) with a
+/// ρ of 0 to `most`. `ratio` is the sum of squares of the steps between neighbouring residuals over that of the residuals, 2·(1 − ρ)
+/// (Durbin and Watson).
+#[must_use]
+pub fn inflation(ratio: f64, most: f64) -> f64 {
+    let correlation = (1.0 - 0.5 * ratio).max(0.0).min(most);
+    (1.0 + correlation) / (1.0 - correlation)
+}
+
 /// Running mean of one signal.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Level {

@@ -17,7 +17,6 @@ use crate::analysis::statistics::{Mean, correlated_mean, deviation, grid, quanti
 use crate::cycle::backlash::curve::Curve;
 use crate::cycle::backlash::fit::Fit;
 use crate::cycle::backlash::fitted::{Fitted, Levels};
-use crate::cycle::backlash::rounding::Rounded;
 use crate::cycle::backlash::uncertainty::{Give, systematic};
 use crate::cycle::backlash::verdict::check_reversal;
 use crate::error::status_text;
@@ -106,11 +105,10 @@ pub fn estimate(recording: &Recording, channel: &str, model: Option<&Axis>) -> R
     fits.iter().flatten().for_each(|fitted| give.add(fitted));
     let resolution = pieces.iter().map(|piece| piece.resolution).fold(0.0, f64::max);
     let width = turns.iter().map(Turn::width).fold(0.0, f64::max);
-    let told = give.told(systematic(resolution, width, 0.0, 0.0));
+    let grid = systematic(resolution, width, 0.0, 0.0);
+    let told = give.told(grid);
     turns.iter_mut().zip(fits).for_each(|(turn, fitted)| turn.finish(fitted, &friction, told));
-    let alike = |lost: f64| {
-        systematic(resolution, width, 0.0, lost) + give.untold(systematic(resolution, width, 0.0, 0.0), told)
-    };
+    let alike = |lost: f64| systematic(resolution, width, 0.0, lost) + give.untold(grid, told);
     let mean =
         joined(&turns, &friction, alike).ok_or_else(|| Refusal::NoCurve(turns.iter().map(Turn::why).collect()))?;
     let values: Vec<f64> = turns.iter().filter_map(|t| t.result.as_ref().ok()).map(|e| e.lost_motion.value).collect();
@@ -343,14 +341,7 @@ impl Turn {
     fn finish(&mut self, fitted: Result<Fitted, String>, friction: &Friction, told: bool) {
         let change = self.change();
         self.result = fitted.map(|fitted| {
-            let straight = Rounded {
-                lost_motion: fitted.lost_motion,
-                variance: fitted.variance,
-                fit_variance: fitted.variance,
-                clearance: fitted.clearance,
-                stiffness: fitted.stiffness,
-            };
-            let found = fitted.rounded.filter(|_| told).unwrap_or(straight);
+            let found = fitted.curve(told);
             Estimate {
                 lost_motion: Value { value: found.lost_motion, uncertainty: 2.0 * found.variance.sqrt() },
                 clearance: found.clearance,

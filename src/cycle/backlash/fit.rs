@@ -25,7 +25,8 @@
 use super::cholesky::Cholesky;
 use super::curve::{BINS, Curve, Moments};
 use super::fitted::{Fitted, Levels};
-use super::rounding::{Line, Rounding};
+use super::rounding::{Line, Rounding, TOGETHER};
+use crate::cycle::level::inflation;
 
 /// Shares of the wind-up tried, largest first.
 const SHARES: [f64; 3] = [0.65, 0.5, 0.35];
@@ -371,9 +372,7 @@ impl Fit {
         let ratio = if squares > 0.0 { differences / squares } else { 2.0 };
         // Under white noise the ratio has mean 2 and standard deviation 2/√n.
         let structured = ratio < 2.0 - SIGMAS * 2.0 / count.sqrt();
-        // Neighbours that move together carry less than their number: (1 + ρ)/(1 − ρ), ρ = 1 − ratio/2.
-        let correlation = (1.0 - 0.5 * ratio).clamp(0.0, 0.9);
-        let inflation = (1.0 + correlation) / (1.0 - correlation);
+        let inflation = inflation(ratio, TOGETHER);
         let noise = squares / (count - PARAMETERS).max(1.0);
         if self.best.s2 - self.best.s1 < curve.width_mm() {
             // One straight line: only its slope is known, and the kink lies where the spring's torque passes zero.

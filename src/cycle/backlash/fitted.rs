@@ -53,3 +53,18 @@ pub struct Fitted {
     /// The same curve with the table's presliding; `None` where that cannot be told.
     pub rounded: Option<Rounded>,
 }
+
+impl Fitted {
+    /// What the curve says where the table does not give way before it slides.
+    #[must_use]
+    pub fn straight(&self) -> Rounded {
+        let Fitted { lost_motion, variance, clearance, stiffness, .. } = *self;
+        Rounded { lost_motion, variance, fit_variance: variance, clearance, stiffness }
+    }
+
+    /// What the curve says, with the table's presliding taken off where it is `told` and can be.
+    #[must_use]
+    pub fn curve(&self, told: bool) -> Rounded {
+        self.rounded.filter(|_| told).unwrap_or(self.straight())
+    }
+}

@@ -19,6 +19,7 @@
 use super::cholesky::Cholesky;
 use super::curve::Curve;
 use super::fitted::Levels;
+use crate::cycle::level::inflation;
 
 /// The straight fit: kinks, torque across the clearance, stiffness.
 #[derive(Debug, Clone, Copy, Default)]
@@ -58,6 +59,8 @@ const PASSES: u32 = 8;
 const STRAIGHT: f64 = 0.95;
 /// How far the truth may be from the rounded value, as a share of what rounding takes off, for any exponent from 0.4.
 pub const UNTOLD: f64 = 1.0;
+/// Largest correlation of neighbouring bins that is reckoned with.
+pub const TOGETHER: f64 = 0.9;
 
 type Row = [f64; PARAMETERS];
 
@@ -264,9 +267,8 @@ impl Rounding {
         let Some(system) = self.system() else { return };
         let sums = &self.best_sums;
         let ratio = if sums.squares > 0.0 { sums.differences / sums.squares } else { 2.0 };
-        let correlation = (1.0 - 0.5 * ratio).clamp(0.0, 0.9);
         let noise = sums.squares / (sums.count - PARAMETERS as f64).max(1.0);
-        let scale = noise * (1.0 + correlation) / (1.0 - correlation);
+        let scale = noise * inflation(ratio, TOGETHER);
         let gradient = [0.0, -self.change / (k * k), -1.0, 1.0, 0.0];
         let fit_variance = scale * system.inverse_form(gradient);
         let variance = fit_variance + self.levels.variance / (k * k);

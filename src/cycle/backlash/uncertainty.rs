@@ -75,8 +75,13 @@ impl Give {
 #[must_use]
 pub fn variance_of_mean(n: f64, sum: f64, squares: f64, variances: f64) -> f64 {
     let n = n.max(1.0);
-    let seen = if n > 1.0 { ((squares - sum * sum / n) / (n - 1.0)).max(0.0) } else { 0.0 };
-    (variances / n).max(seen) / n
+    (variances / n).max(variance_of_one(n, sum, squares)) / n
+}
+
+/// Variance that `n` values show; 0 of fewer than two.
+#[must_use]
+pub fn variance_of_one(n: f64, sum: f64, squares: f64) -> f64 {
+    if n > 1.0 { ((squares - sum * sum / n) / (n - 1.0)).max(0.0) } else { 0.0 }
 }
 
 /// Variance that no repetition takes away, mm²: each end of the lost motion lies somewhere on the encoder's grid q,

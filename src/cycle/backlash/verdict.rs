@@ -5,7 +5,8 @@
 
 use super::fitted::{Fitted, Levels};
 use super::plan::Plan;
-use super::uncertainty::{Give, systematic, variance_of_mean};
+use super::rounding::Rounded;
+use super::uncertainty::{Give, systematic, variance_of_mean, variance_of_one};
 use crate::error::{
     Fault, GIB_ERR_BACKLASH_DIRECTIONS, GIB_ERR_BACKLASH_LIMIT, GIB_ERR_BACKLASH_MOTOR_FRICTION,
     GIB_ERR_BACKLASH_NOISE, GIB_ERR_BACKLASH_RESOLUTION, GIB_ERR_BACKLASH_SHAPE, GIB_ERR_STATE, in_range,
@@ -125,20 +126,19 @@ struct Values {
     squares: f64,
     variances: f64,
     clearance: f64,
-    windup: f64,
     held: f64,
     stiffness: f64,
 }
 
 impl Values {
-    fn add(&mut self, lost_motion: f64, variance: f64, clearance: f64, held: f64, stiffness: f64) {
-        self.sum += lost_motion;
-        self.squares += lost_motion * lost_motion;
-        self.variances += variance;
-        self.clearance += clearance;
-        self.windup += lost_motion - clearance;
+    /// Adds a reversal by one of its two curves, and the wind-up that was held at standstill.
+    fn add(&mut self, curve: &Rounded, held: f64) {
+        self.sum += curve.lost_motion;
+        self.squares += curve.lost_motion * curve.lost_motion;
+        self.variances += curve.variance;
+        self.clearance += curve.clearance;
         self.held += held;
-        self.stiffness += stiffness;
+        self.stiffness += curve.stiffness;
     }
 }
 
@@ -163,15 +163,10 @@ impl Sense {
     /// Adds a reversal: its fit, its levels, the peak rule's reading (mm) if any, and the points of its curve.
     pub fn add(&mut self, fit: &Fitted, levels: &Levels, peak: Option<f64>, steps: f64) {
         self.reversals += 1.0;
-        self.straight.add(fit.lost_motion, fit.variance, fit.clearance, fit.held, fit.stiffness);
-        match &fit.rounded {
-            // Of the way to the clearance the table gives back what it took.
-            Some(r) => {
-                let held = fit.held * fit.stiffness / r.stiffness;
-                self.rounded.add(r.lost_motion, r.variance, r.clearance, held, r.stiffness);
-            }
-            None => self.rounded.add(fit.lost_motion, fit.variance, fit.clearance, fit.held, fit.stiffness),
-        }
+        self.straight.add(&fit.straight(), fit.held);
+        // Of the way to the clearance the table gives back what it took.
+        let rounded = fit.curve(true);
+        self.rounded.add(&rounded, fit.held * fit.stiffness / rounded.stiffness);
         self.give.add(fit);
         self.stiffness_variance += fit.stiffness_error * fit.stiffness_error;
         self.sliding += 0.5 * (levels.after - levels.before);
@@ -214,13 +209,9 @@ impl Sense {
             lost_motion_um: values.sum / n * um,
             uncertainty_um: 2.0 * (self.variance_of_mean(told) + common).sqrt() * um,
             clearance_um: clearance * um,
-            windup_um: values.windup / n * um,
+            windup_um: (values.sum - values.clearance) / n * um,
             standstill_um: (clearance + values.held / n + far) * um,
-            spread_um: if n > 1.0 {
-                ((values.squares - values.sum * values.sum / n) / (n - 1.0)).max(0.0).sqrt() * um
-            } else {
-                0.0
-            },
+            spread_um: variance_of_one(n, values.sum, values.squares).sqrt() * um,
             peak_um: if self.peaks > 0.0 { self.peak_sum / self.peaks * um } else { 0.0 },
             stiffness_nm_mm: values.stiffness / n * nm,
             stiffness_error_nm_mm: self.stiffness_variance.sqrt() / n * nm,

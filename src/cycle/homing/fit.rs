@@ -16,6 +16,7 @@
 //! Work is cut into slices of [`SLICE`] blocks, so that a cycle's share is bounded.
 
 use super::trace::{BLOCKS, Trace};
+use crate::cycle::level::inflation;
 use crate::error::{Fault, GIB_ERR_HOMING_SHAPE};
 
 /// Blocks looked at in a cycle.
@@ -335,12 +336,10 @@ impl Fit {
     }
 
     /// By how much the line's variance exceeds that of independent blocks: an axis that swings or sticks and slips on the
-    /// stop scatters about its line, but not from block to block (Durbin and Watson's ratio, 2·(1 − ρ)).
+    /// stop scatters about its line, but not from block to block.
     fn hanging_together(&self, slope: f64, about_line: f64) -> f64 {
         const MOST: f64 = 0.7;
-        let ratio = self.block_to_block(slope) / about_line.max(f64::MIN_POSITIVE);
-        let rho = (1.0 - 0.5 * ratio).clamp(0.0, MOST);
-        (1.0 + rho) / (1.0 - rho)
+        inflation(self.block_to_block(slope) / about_line.max(f64::MIN_POSITIVE), MOST)
     }
 
     /// Peak of the torque's swing before contact: what the level scatters more than its noise from block to block, beyond chance.

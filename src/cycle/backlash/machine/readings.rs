@@ -156,10 +156,12 @@ impl Probe {
         let fault =
             |field, value, low, high| Err(Fault { code: GIB_ERR_BACKLASH_MOTOR_FRICTION, field, value, low, high });
         let readings = self.back.n.min(self.forth.n);
-        let (share, error) = (twice.max(0.0) / change, variance.sqrt() / change);
-        if readings < FEWEST || !error.is_finite() {
-            return fault("probe_readings\0", readings, readings.max(FEWEST) + 1.0, f64::MAX);
+        if readings < FEWEST {
+            return fault("probe_readings\0", readings, FEWEST, f64::MAX);
         }
+        // Readings all at one place leave the error open.
+        let error = Some(variance.sqrt() / change).filter(|error| error.is_finite()).unwrap_or(f64::MAX);
+        let share = twice.max(0.0) / change;
         if error > WORST_ERROR {
             return fault("motor_friction_error_ratio\0", error, 0.0, WORST_ERROR);
         }

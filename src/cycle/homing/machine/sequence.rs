@@ -141,11 +141,13 @@ impl Homing {
     fn evaluated(&mut self) {
         let plan = self.plan;
         let back = self.touch < plan.touches;
-        for (side, touches) in self.sides.iter_mut().zip(&mut self.touches).take(if back { plan.motors } else { 0 }) {
-            touches.slid_back(side.sliding);
-            side.holds(&plan, side.sliding);
-            if let Some(fault) = side.held_back(&plan, touches.level()) {
-                return self.leave(self.racked_back().filter(|_| fault.field == "torque\0").unwrap_or(fault));
+        for i in 0..if back { plan.motors.min(2) } else { 0 } {
+            let sliding = self.sides[i].sliding;
+            self.touches[i].slid_back(sliding);
+            self.sides[i].holds(&plan, sliding);
+            let level = self.touches[i].level();
+            if let Some(fault) = self.sides[i].held_back(&plan, level, || self.racked_back()) {
+                return self.leave(fault);
             }
         }
         if self.suspect != Fault::NONE {

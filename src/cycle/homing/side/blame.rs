@@ -223,10 +223,10 @@ impl Side {
         elsewhere.then_some(Fault { low: 0.0, high: press, ..fault })
     }
 
-    /// What the way back tells, if anything is wrong with what was pressed on. `level`: torque before contact. Nothing
-    /// is said of a way back too short to slide steadily.
+    /// What the way back tells, if anything is wrong with what was pressed on. `level`: torque before contact; `racked`: what explains a
+    /// torque on the way back of a gantry better. Nothing is said of a way back too short to slide steadily.
     #[must_use]
-    pub fn held_back(&self, plan: &Plan, level: f64) -> Option<Fault> {
+    pub fn held_back(&self, plan: &Plan, level: f64, racked: impl Fn() -> Option<Fault>) -> Option<Fault> {
         let fault = |code, field, value, low, high| Some(Fault { code, field, value, low, high });
         // A stop pushes the axis back; a tight spot takes as much torque above what sliding takes both ways.
         let low = self.sliding - 0.5 * (plan.threshold - level) - 4.0 * FILTERED * self.noise();
@@ -237,7 +237,7 @@ impl Side {
             fault(GIB_ERR_LAG, "position_mm\0", behind, -most, most)
         } else if held >= plan.release {
             // Away from the stop, and still at the limit toward it.
-            fault(GIB_ERR_HOMING_TORQUE_STUCK, "torque\0", held, -plan.limit, plan.release)
+            racked().or(fault(GIB_ERR_HOMING_TORQUE_STUCK, "torque\0", held, -plan.limit, plan.release))
         } else if !(stayed || self.lowest < low) {
             None
         } else if self.stuck(plan) && !pulls {
@@ -246,7 +246,7 @@ impl Side {
         } else if stayed {
             fault(GIB_ERR_HOMING_TIGHT_SPOT, "position_mm\0", behind, -most, most)
         } else {
-            fault(GIB_ERR_HOMING_TIGHT_SPOT, "torque\0", self.lowest, low, plan.limit)
+            racked().or(fault(GIB_ERR_HOMING_TIGHT_SPOT, "torque\0", self.lowest, low, plan.limit))
         }
     }
 
