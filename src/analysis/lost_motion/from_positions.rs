@@ -88,8 +88,6 @@ pub struct LostMotion {
 
 /// Stretches the stroke is cut into for the table along it.
 const STRETCHES: usize = 10;
-/// A gap of more rows than this ends a piece: the axis may have turned round unseen.
-const LONGEST_GAP_ROWS: f64 = 20.0;
 
 /// Measures the lost motion of `channel`.
 ///
@@ -160,10 +158,8 @@ fn tracks(recording: &Recording, channel: &str) -> Result<Vec<Piece>, Refusal> {
         let message = format!("{} is a length, {} an angle, or the other way round", motor.name, table.name);
         return Err(Refusal::PositionsDiffer(message));
     };
-    let longest_s = recording.sampling.gap_s.max(LONGEST_GAP_ROWS * recording.sampling.period_s);
-    let pieces = recording.pieces(&[motor, table], longest_s);
     let mut tracks = Vec::new();
-    for rows in pieces {
+    for rows in super::unbroken(recording, &[motor, table]) {
         let take = |values: &[f64]| -> Vec<f64> { rows.iter().map(|row| values[*row]).collect() };
         let (motor, table) = (take(&motor_values), take(&table_values));
         same_scale(&motor, &table)?;

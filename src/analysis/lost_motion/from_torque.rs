@@ -11,9 +11,10 @@
 
 pub use super::motor_friction::MotorFriction;
 use super::motor_friction::{Friction, motor_friction};
-use super::sweeps::{Sample, Sweep, Track};
+use super::sweeps::Track;
+use super::whole::{FEWEST_ROWS, SIGMAS, Usual, Whole};
 use super::{Refusal, SPEED_RATIO, Value};
-use crate::analysis::statistics::{Mean, correlated_mean, deviation, grid, quantile, student_95};
+use crate::analysis::statistics::{Mean, deviation, grid, quantile, student_95};
 use crate::cycle::backlash::curve::Curve;
 use crate::cycle::backlash::fit::Fit;
 use crate::cycle::backlash::fitted::{Fitted, Levels};
@@ -87,8 +88,8 @@ pub struct TorqueLostMotion {
 /// A missing column, no reversal, or none whose curve can be fitted.
 pub fn estimate(recording: &Recording, channel: &str, model: Option<&Axis>) -> Result<TorqueLostMotion, Refusal> {
     let (pieces, unit, effort_unit) = pieces(recording, channel, model)?;
-    let usual = usual_levels(&pieces);
-    let mut turns: Vec<Turn> = pieces.iter().flat_map(|piece| piece.turns(usual)).collect();
+    let usual = Usual::of(pieces.iter().map(|piece| &piece.track))?;
+    let mut turns: Vec<Turn> = pieces.iter().flat_map(|piece| piece.turns(&usual)).collect();
     if turns.is_empty() {
         return Err(Refusal::NoReversal);
     }
@@ -108,7 +109,9 @@ pub fn estimate(recording: &Recording, channel: &str, model: Option<&Axis>) -> R
     let grid = systematic(resolution, width, 0.0, 0.0);
     let told = give.told(grid);
     turns.iter_mut().zip(fits).for_each(|(turn, fitted)| turn.finish(fitted, &friction, told));
-    let alike = |lost: f64| systematic(resolution, width, 0.0, lost) + give.untold(grid, told);
+    // No presliding bends a curve the other way: by as much it is not the model's.
+    let bent = give.untold(grid, told).max((0.5 * give.mean().min(0.0)).powi(2));
+    let alike = |lost: f64| systematic(resolution, width, 0.0, lost) + bent;
     let mean =
         joined(&turns, &friction, alike).ok_or_else(|| Refusal::NoCurve(turns.iter().map(Turn::why).collect()))?;
     let values: Vec<f64> = turns.iter().filter_map(|t| t.result.as_ref().ok()).map(|e| e.lost_motion.value).collect();
@@ -128,7 +131,6 @@ pub fn estimate(recording: &Recording, channel: &str, model: Option<&Axis>) -> R
 /// An unbroken piece of the recording, with the effort in the place of the difference.
 pub(super) struct Piece {
     pub(super) track: Track,
-    sweeps: Vec<Sweep>,
     rows: Vec<usize>,
     resolution: f64,
 }
@@ -142,7 +144,6 @@ fn pieces(recording: &Recording, channel: &str, model: Option<&Axis>) -> Result<
     let foreign = || Refusal::Recording(RecordingError::new(&recording.file, "holds a column without a unit"));
     let (positions, unit) = position.in_house().ok_or_else(foreign)?;
     let (efforts, effort_unit) = effort.in_house().ok_or_else(foreign)?;
-    let rows = recording.pieces(&[position, effort], recording.sampling.gap_s);
     let piece = |rows: Vec<usize>| {
         let take = |values: &[f64]| -> Vec<f64> { rows.iter().map(|row| values[*row]).collect() };
         let motor = take(&positions);
@@ -152,9 +153,9 @@ fn pieces(recording: &Recording, channel: &str, model: Option<&Axis>) -> Result<
             let (belief, per_load) = (model.belief(), model.drive.motor_per_load());
             track.take_off_motion(per_load * belief.inertia, per_load * belief.viscous);
         }
-        Piece { sweeps: track.fine_sweeps(), track, rows, resolution }
+        Piece { track, rows, resolution }
     };
-    Ok((rows.into_iter().map(piece).collect(), unit, effort_unit))
+    Ok((super::unbroken(recording, &[position, effort]).into_iter().map(piece).collect(), unit, effort_unit))
 }
 
 /// A reversal with what its fit needs.
@@ -175,29 +176,29 @@ pub(super) struct Turn {
 }
 
 impl Piece {
-    fn turns(&self, usual: [f64; 2]) -> Vec<Turn> {
-        (1..self.sweeps.len()).map(|i| self.turn(i, usual)).collect()
+    fn turns(&self, usual: &Usual) -> Vec<Turn> {
+        let sweeps = usual.sweeps(&self.track);
+        (1..sweeps.len()).map(|i| self.turn(&sweeps[..=i], usual)).collect()
     }
 
-    fn turn(&self, i: usize, usual: [f64; 2]) -> Turn {
-        let (before, after) = (&self.sweeps[i - 1], &self.sweeps[i]);
-        let (row, direction) = (after.rows.start, after.direction);
+    /// The reversal before the last of these sweeps.
+    fn turn(&self, sweeps: &[Whole], usual: &Usual) -> Turn {
+        let (before, after) = (&sweeps[sweeps.len() - 2], &sweeps[sweeps.len() - 1]);
+        let (row, direction) = (after.start, after.direction);
         let position = self.track.motor[row];
-        let samples = after
-            .rows
-            .clone()
-            .map(|row| (direction * (self.track.motor[row] - position), direction * self.track.difference[row]))
-            .collect();
+        let sample =
+            |row: &usize| (direction * (self.track.motor[*row] - position), direction * self.track.difference[*row]);
+        let samples = after.rows.iter().map(sample).collect();
         // A scan that ends soon after the table slides holds too little sliding of its own; the sweep before last went the
         // same way.
-        let own = sliding(after, direction, usual);
-        let earlier = i.checked_sub(2).and_then(|i| sliding(&self.sweeps[i], direction, usual));
+        let own = usual.sliding(after);
+        let earlier = sweeps.iter().rev().nth(2).and_then(|sweep| usual.sliding(sweep));
         let after_level = match (own, earlier) {
             (Some(own), Some(earlier)) if earlier.error < own.error && similar(&own, &earlier) => Some(earlier),
             (None, earlier) => earlier,
             (own, _) => own,
         };
-        let levels = match (sliding(before, direction, usual), after_level) {
+        let levels = match (usual.sliding(before).map(|mean| Mean { value: -mean.value, ..mean }), after_level) {
             (Some(before), Some(after)) => Ok((before, after)),
             (None, _) => Err("the axis does not slide steadily before it".to_owned()),
             (_, None) => Err("the axis does not slide steadily after it".to_owned()),
@@ -209,8 +210,8 @@ impl Piece {
             direction,
             samples,
             levels,
-            speed: after.top_speed,
-            way: before.way().min(after.way()),
+            speed: after.speed,
+            way: before.way.min(after.way),
             resolution: self.resolution,
             result: Err(String::new()),
         }
@@ -219,40 +220,6 @@ impl Piece {
 
 fn similar(a: &Mean, b: &Mean) -> bool {
     (a.value - b.value).abs() < 4.0 * a.error.hypot(b.error) + 0.1 * a.value.abs()
-}
-
-/// The effort of sliding in the negative and the positive direction, over the longest ways of the recording.
-fn usual_levels(pieces: &[Piece]) -> [f64; 2] {
-    [-1.0, 1.0].map(|direction| {
-        let sweeps = || pieces.iter().flat_map(|piece| &piece.sweeps).filter(|sweep| sweep.direction == direction);
-        let longest = sweeps().map(Sweep::way).fold(0.0, f64::max);
-        let long = sweeps().filter(|sweep| sweep.way() > 0.5 * longest);
-        let levels: Vec<f64> = long.filter_map(steady).map(|mean| mean.value).collect();
-        quantile(&levels, 0.5).unwrap_or(f64::NAN)
-    })
-}
-
-/// The effort of sliding in a sweep, in the sense of `direction`; `None` where the axis does not slide as it usually does: a
-/// short way in which the drive only winds up is steady too, but is no sliding.
-fn sliding(sweep: &Sweep, direction: f64, usual: [f64; 2]) -> Option<Mean> {
-    const LIKE: f64 = 0.2; // less than from the sliding level to that of a motor that rubs alone, with 55 % of the friction
-    let mean = steady(sweep)?;
-    let expected = usual[usize::from(sweep.direction > 0.0)];
-    let like = (mean.value - expected).abs() <= LIKE * (usual[1] - usual[0]).abs();
-    like.then_some(Mean { value: direction * mean.value, ..mean })
-}
-
-/// The effort in a sweep over the last third of the way, at one speed. `None` where the sweep is too short to tell.
-fn steady(sweep: &Sweep) -> Option<Mean> {
-    const FEWEST_ROWS: usize = 20;
-    let (first, last) = (sweep.moving.first()?, sweep.moving.last()?);
-    let way = (last.motor - first.motor).abs();
-    let late: Vec<&Sample> = sweep.moving.iter().filter(|s| (s.motor - first.motor).abs() > 0.667 * way).collect();
-    let speeds: Vec<f64> = late.iter().map(|s| s.speed.abs()).collect();
-    let usual = quantile(&speeds, 0.5)?;
-    let steady: Vec<f64> =
-        late.iter().filter(|s| (s.speed.abs() - usual).abs() < 0.2 * usual).map(|s| s.difference).collect();
-    if steady.len() < FEWEST_ROWS { None } else { correlated_mean(&steady) }
 }
 
 /// Bins over the way to sliding. The fit leaves out the first two, in which the motor's own friction turns round.
@@ -269,12 +236,15 @@ fn leave_out_fast(turns: &mut [Turn]) {
     }
 }
 
-/// Sets aside reversals that say little beside the clearest one: a mean that counts all alike would be theirs.
+/// Sets aside reversals that say little beside the clearest one, of the lost motion or of the table's presliding: a mean that counts all
+/// alike would be theirs.
 fn leave_out_unclear(fits: &mut [Result<Fitted, String>]) {
     const TIMES: f64 = 4.0;
     const SHARE: f64 = 0.03;
-    let clearest = fits.iter().flatten().map(|fit| fit.variance.sqrt()).fold(f64::INFINITY, f64::min);
-    let unclear = |fit: &Fitted| fit.variance.sqrt() > (TIMES * clearest).max(SHARE * fit.lost_motion);
+    let error =
+        |fit: &Fitted| fit.rounded.map_or(fit.variance, |rounded| rounded.fit_variance.max(fit.variance)).sqrt();
+    let clearest = fits.iter().flatten().map(error).fold(f64::INFINITY, f64::min);
+    let unclear = |fit: &Fitted| error(fit) > (TIMES * clearest).max(SHARE * fit.lost_motion);
     for fit in fits.iter_mut().filter(|fit| fit.as_ref().is_ok_and(unclear)) {
         *fit = Err("says much less than the clearest reversal".into());
     }
@@ -283,25 +253,45 @@ fn leave_out_unclear(fits: &mut [Result<Fitted, String>]) {
 impl Turn {
     /// Travel at which the effort has first come near the sliding level after the reversal.
     fn rise(&self) -> Option<f64> {
-        const NEAR: f64 = 0.9;
+        const NEAR: f64 = 0.95;
         let (before, after) = self.levels.as_ref().ok()?;
-        let goal = before.value + (0.5 + 0.5 * NEAR) * (after.value - before.value);
-        // Sixteen rows calm the noise; the delay they bring only lengthens the curve a little.
-        let mut smooth = before.value;
-        self.samples.iter().find_map(|(travel, effort)| {
-            smooth += (effort - smooth) / 16.0;
-            (smooth > goal).then_some(*travel)
-        })
+        let goal = before.value + NEAR * (after.value - before.value);
+        let near = |rows: i32| {
+            let mut smooth = before.value;
+            self.samples.iter().find_map(|(travel, effort)| {
+                smooth += (effort - smooth) / f64::from(rows);
+                (smooth > goal).then_some(*travel)
+            })
+        };
+        // Sixteen rows calm the noise; fewer where the delay they bring makes the curve much longer: a motor may run off once the
+        // table slides.
+        const LONGER: f64 = 1.25;
+        let found = [16, 8, 4, 2, 1].map(near);
+        let much_longer =
+            |ends: &&[Option<f64>]| ends[0].zip(ends[1]).is_none_or(|(slow, quick)| slow > LONGER * quick);
+        let halved = found.windows(2).take_while(much_longer).count();
+        found[halved]
     }
 
     pub(super) fn width(&self) -> f64 {
         (1.5 * self.rise().unwrap_or(0.0) / BINS).max(self.resolution)
     }
 
+    /// How much more the effort is in the second half of the clearance than in the first; `None` with few rows in it.
+    pub(super) fn growth(&self, fitted: &Fitted, fewest_rows: usize) -> Option<f64> {
+        let half = |from: f64| -> Vec<f64> {
+            let half = from..from + 0.5 * fitted.clearance;
+            self.samples.iter().filter(|(travel, _)| half.contains(travel)).map(|(_, effort)| *effort).collect()
+        };
+        let (first, second) = (half(fitted.held), half(fitted.held + 0.5 * fitted.clearance));
+        let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len().max(1) as f64;
+        (first.len() + second.len() >= fewest_rows).then(|| mean(&second) - mean(&first))
+    }
+
     pub(super) fn fit(&self, motor: f64, motor_error: f64) -> Result<Fitted, String> {
         let (before, after) = self.levels.as_ref().map_err(Clone::clone)?;
         let change = after.value - before.value;
-        if change <= 5.0 * before.error.hypot(after.error) {
+        if change <= SIGMAS * before.error.hypot(after.error) {
             return Err("the effort does not change at it by more than its noise".into());
         }
         let Some(rise) = self.rise().filter(|rise| *rise > 0.0) else {
@@ -320,12 +310,31 @@ impl Turn {
                 break;
             }
         }
-        let fitted = check_reversal(fit.result(), 1.0)
-            .map_err(|fault| status_text(fault.code).trim_end_matches('\0').to_owned())?;
+        let fitted = check_reversal(fit.result(), 1.0).map_err(|fault| {
+            self.too_coarse(rise).unwrap_or_else(|| status_text(fault.code).trim_end_matches('\0').to_owned())
+        })?;
         if self.way < 1.2 * fitted.lost_motion {
             return Err("the way before or after it is too short for the table to slide".into());
         }
         Ok(fitted)
+    }
+
+    /// What is too coarse for the curve, if something is: rows in time, or the encoder.
+    fn too_coarse(&self, rise: f64) -> Option<String> {
+        // The middle of the change, which noise does not mistake for sliding.
+        let (before, after) = self.levels.as_ref().ok()?;
+        let turning = |effort: f64| (0.1..0.9).contains(&((effort - before.value) / (after.value - before.value)));
+        let turning: Vec<f64> =
+            self.samples.iter().filter(|(travel, effort)| *travel < rise && turning(*effort)).map(|s| s.0).collect();
+        let (low, high) = turning.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        if turning.len() < FEWEST_ROWS {
+            return Some(format!(
+                "fewer than {FEWEST_ROWS} rows while the effort turns round: go slower, or record more often"
+            ));
+        }
+        (high - low < FEWEST_ROWS as f64 * self.resolution).then(|| {
+            format!("fewer than {FEWEST_ROWS} encoder steps while the effort turns round: use a finer encoder or scale")
+        })
     }
 
     fn change(&self) -> f64 {
@@ -353,10 +362,9 @@ impl Turn {
         });
     }
 
-    fn why(&self) -> String {
+    fn why(&self) -> (usize, String) {
         let why = self.result.as_ref().err().filter(|why| !why.is_empty()).cloned();
-        let why = why.or_else(|| self.fit(0.0, 0.0).err()).unwrap_or_default();
-        format!("row {}: {why}", self.row)
+        (self.row, why.or_else(|| self.fit(0.0, 0.0).err()).unwrap_or_default())
     }
 
     fn report(self) -> Reversal {

@@ -31,6 +31,8 @@ impl Friction {
     }
 }
 
+/// The fewest rows on each way of a probe, and across a clearance.
+const FEWEST_ROWS: usize = 10;
 /// The fewest bins that the clearance must span for its level to show the motor's friction.
 const CLEARANCE_SHARE: f64 = 0.15;
 
@@ -43,12 +45,37 @@ pub(super) fn motor_friction(pieces: &[Piece], turns: &[Turn], about: f64) -> (F
         let fitted = turn.fit(0.0, 0.0).ok()?;
         let (before, after) = turn.levels.as_ref().ok()?;
         let wide = fitted.clearance > CLEARANCE_SHARE * fitted.lost_motion && fitted.clearance > 4.0 * turn.width();
-        wide.then_some(fitted.level - 0.5 * (before.value + after.value))
+        let value = fitted.level - 0.5 * (before.value + after.value);
+        let growth = turn.growth(&fitted, FEWEST_ROWS).filter(|_| wide)?;
+        Some(Level { value, error: fitted.level_error, growth })
     };
-    let levels: Vec<f64> = turns.iter().filter_map(level).collect();
-    match mean_of(&levels) {
+    let levels: Vec<Level> = turns.iter().filter_map(level).collect();
+    match Level::mean(&levels) {
         Some(found) => (Friction { value: Some(found) }, MotorFriction::Clearance),
         None => (Friction { value: None }, MotorFriction::Assumed),
+    }
+}
+
+/// The effort across the clearance of one reversal.
+struct Level {
+    value: f64,
+    /// Standard error of the fit.
+    error: f64,
+    /// How much it grows from the first half of the clearance to the second: a motor that jumps across is also accelerated.
+    growth: f64,
+}
+
+impl Level {
+    /// Mean and its standard error, at least 0.
+    fn mean(levels: &[Level]) -> Option<(f64, f64)> {
+        let n = levels.len() as f64;
+        let mean = |of: fn(&Level) -> f64| levels.iter().map(of).sum::<f64>() / n;
+        let values: Vec<f64> = levels.iter().map(|level| level.value).collect();
+        let fits = (mean(|level| level.error.powi(2)) / n).sqrt();
+        let scatter = mean_of(&values).map_or(0.0, |(_, error)| error);
+        // Anywhere over twice the growth, and alike at every reversal.
+        let common = mean(|level| level.growth) / 3f64.sqrt();
+        (n > 0.0).then(|| (mean(|level| level.value).max(0.0), fits.max(scatter).hypot(common)))
     }
 }
 
@@ -61,7 +88,6 @@ fn mean_of(values: &[f64]) -> Option<(f64, f64)> {
 
 /// The motor's friction from each short way back and forth: half the distance of two parallel lines of effort over position.
 fn probes(piece: &Piece, about: f64) -> Vec<f64> {
-    const FEWEST_ROWS: usize = 10;
     // A way forth ends before the place where the motor turned, and has begun when it moves fast enough to count.
     const SHARED: f64 = 0.6;
     // A wiggle as the motor comes to rest turns no friction round.

@@ -45,14 +45,23 @@ pub(super) struct Sweep {
 impl Track {
     /// Cuts the track at its turning points; wiggles below 0.05 % of the stroke are none.
     pub fn sweeps(&self) -> Vec<Sweep> {
-        let (low, high) =
-            self.motor.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        let (low, high) = self.stroke();
         self.cut(smallest_travel(&self.motor).max(5e-4 * (high - low)))
     }
 
     /// Cuts the track at every turn that noise and grid do not make by themselves.
     pub fn fine_sweeps(&self) -> Vec<Sweep> {
         self.cut(smallest_travel(&self.motor))
+    }
+
+    /// Cuts the track at turns of more than a quarter of the stroke.
+    pub fn long_sweeps(&self) -> Vec<Sweep> {
+        let (low, high) = self.stroke();
+        self.sweeps_beyond(0.25 * (high - low))
+    }
+
+    fn stroke(&self) -> (f64, f64) {
+        self.motor.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)))
     }
 
     /// Cuts the track at turns of more than `travel`, and than noise and grid make by themselves.
