@@ -13,190 +13,183 @@
 //! are fitted anew without the blocks near the corner, where the axis still brakes and J·a disturbs the torque, and
 //! near the limit, where the drive cuts it off. Both are chosen by position, never by the noisy torque.
 //!
-//! Work is cut into slices of [`SLICE`] blocks, so that a cycle's share is bounded.
+//! Blocks are looked at once, a group of them at a time. Sums up to the start of every group are kept, of which two and
+//! a few blocks give those of any part. What scatters about a level or a line can only grow with the blocks in it: so a
+//! group is passed over in which no split can be better than the best so far, and the search, which begins at the limit,
+//! ends where the line alone scatters more than that. Work is cut into slices, so that a cycle's share is bounded.
 
-use super::trace::{BLOCKS, Trace};
-use crate::cycle::level::inflation;
-use crate::error::{Fault, GIB_ERR_HOMING_SHAPE};
+use super::trace::{BLOCKS, Frame, GROUP, Trace};
+use crate::error::Fault;
+use contact::{FEWEST, Parts, SURE, lacks};
+use sums::{Start, Steps, Sums};
 
-/// Blocks looked at in a cycle.
-const SLICE: u32 = 8;
-/// Fewest blocks in a level or a line.
-const FEWEST: f64 = 6.0;
-/// Standard errors by which a slope must be above zero.
-const SURE: f64 = 5.0;
+mod contact;
+mod sums;
+#[cfg(test)]
+mod tests;
+
+pub use contact::Contact;
+
+/// Blocks in a group.
+const SIZE: u32 = GROUP as u32;
+/// Groups that a trace takes up: its first block is anywhere in one.
+const GROUPS: usize = BLOCKS / GROUP + 1;
+/// Blocks at which a split is tried in a cycle, and groups passed over. Sums are taken of one group a cycle.
+const TRIED: u32 = 4;
+const PASSED: u32 = 16;
+/// Blocks for which the axis rests a cycle, three times over: there is more time than work. With less rest random gantries are found
+/// worse, and a tight spot may be named a soft stop.
+const RESTED: u32 = 8;
 /// Part of the line that is used: from the share of the rise where impact is over to the one where limiting is near. On
 /// random axes the contact found with 0.13 lies 0.15 µm off in the mean, with 0.2 nothing.
 const LINE_FROM: f64 = 0.2;
 const LINE_TO: f64 = 0.95;
-const LINE_HALF: f64 = 0.5 * (LINE_FROM + LINE_TO);
 /// The level ends this share of the line's length before the corner.
 const LEVEL_GAP: f64 = 0.1;
-
-/// Sums over blocks: number, ways x, torques t and their products.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    n: f64,
-    x: f64,
-    t: f64,
-    xx: f64,
-    xt: f64,
-    tt: f64,
-}
-
-impl Sums {
-    #[inline(always)]
-    fn add(&mut self, weight: f64, (x, t): (f64, f64)) {
-        self.n += weight;
-        self.x += weight * x;
-        self.t += weight * t;
-        self.xx += weight * x * x;
-        self.xt += weight * x * t;
-        self.tt += weight * t * t;
-    }
-
-    /// Both together.
-    fn and(&self, other: &Sums) -> Sums {
-        let [a, b] = [self, other];
-        Sums { n: a.n + b.n, x: a.x + b.x, t: a.t + b.t, xx: a.xx + b.xx, xt: a.xt + b.xt, tt: a.tt + b.tt }
-    }
-
-    /// Squares of t about its mean.
-    fn scatter(&self) -> f64 {
-        (self.tt - self.t * self.t / self.n).max(0.0)
-    }
-
-    /// Squares of x about its mean, and products.
-    fn spread(&self) -> (f64, f64) {
-        (self.xx - self.x * self.x / self.n, self.xt - self.x * self.t / self.n)
-    }
-
-    /// Slope of the least-squares line and squares about it; slope 0 where x does not vary.
-    fn line(&self) -> (f64, f64) {
-        let (sxx, sxt) = self.spread();
-        if sxx <= 0.0 {
-            return (0.0, self.scatter());
-        }
-        let slope = sxt / sxx;
-        (slope, (self.scatter() - slope * sxt).max(0.0))
-    }
-}
-
-/// What a touch shows. Ways in mm from the touch's start, torque in the unit of the input, variances of one value.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Contact {
-    /// Way to the contact point.
-    pub way: f64,
-    /// Its variance, mm².
-    pub variance: f64,
-    /// Torque before contact.
-    pub level: f64,
-    /// Slope of the line: stiffness of drive and stop in series.
-    pub stiffness: f64,
-    /// Standard error of the slope.
-    pub stiffness_error: f64,
-    /// Standard deviation of a block about level and line.
-    pub noise: f64,
-    /// By how much later the line starts as its upper half has it than as its lower half has it, and the variance of that: a stop that
-    /// stiffens with the force, or an impact that is over late, bends the line.
-    pub bend: f64,
-    /// See `bend`.
-    pub bend_variance: f64,
-    /// Way that a torque which swings before contact, as of an axis that sticks and slips, may hide.
-    pub swing: f64,
-    /// Way from contact to where the torque limit was reached.
-    pub press: f64,
-    /// Way at which the plain threshold was reached.
-    pub threshold_way: f64,
-}
+/// Where the parts end, as shares of the line's length from the corner: the level, nothing, both halves of the line.
+const ENDS: [f64; 4] = [-LEVEL_GAP, LINE_FROM, 0.5 * (LINE_FROM + LINE_TO), LINE_TO];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
-    /// Ends when all blocks are summed or the threshold is met.
-    Gather,
-    /// Ends when every split is tried.
-    Scan,
-    /// Ends when level and line are summed anew.
-    Refine,
-    /// Ends with the next start.
+    /// Ends when the first block of the window is found.
+    Window,
+    /// Ends when all torques are summed or the threshold is met.
+    Torques,
+    /// Ends when the ways of all groups are summed that may hold the corner, from the last on.
+    Ways,
+    /// Ends when every split is tried that may be the best.
+    Split,
+    /// Ends when the ends of level and line are found.
+    Ends,
+    /// Ends with the contact point or the want of it.
+    Solve,
+    /// Ends when the first quarter is summed, where there is no contact point.
+    Early,
+    /// Ends when the axis has rested, and with the next start.
     Ready,
 }
 
-/// A fit under way.
+/// A place between two blocks: sums and steps up to it, and steps up to the block behind it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Mark {
+    sums: Sums,
+    steps: Steps,
+    across: Steps,
+}
+
+/// The best split so far: squares that it leaves about level and line, and where its line starts.
 #[derive(Debug, Clone, Copy)]
+struct Best {
+    left: f64,
+    corner: f64,
+}
+
+impl Best {
+    /// Tries the split of what lies from `first` to `past` at `at`: squares about level and line.
+    #[inline(always)]
+    fn try_split(&mut self, first: &Sums, at: &Sums, past: &Sums) -> [f64; 2] {
+        let (level, line) = (at.since(first), past.since(at));
+        let ((slope, about_line), about_level) = (line.line(), level.scatter());
+        let left = about_level + about_line;
+        if left < self.left && slope > 0.0 && level.n >= FEWEST && line.n >= FEWEST {
+            self.left = left;
+            self.corner = line.x / line.n - (line.t / line.n - level.t / level.n) / slope;
+        }
+        [about_level, about_line]
+    }
+}
+
+/// A fit under way. Blocks are numbered from the start of the group that holds the oldest.
+#[derive(Debug, Clone)]
 pub struct Fit {
     stage: Stage,
-    /// Next block.
+    /// Cycles so far, and those for which the axis rests.
+    cycles: u32,
+    rest: u32,
+    /// Next block, group or end.
     at: u32,
-    /// One past the last block before the limit.
+    /// First block, one past the last before the limit, and its group.
+    begin: u32,
     end: u32,
+    last: u32,
+    /// First group whose ways are summed.
+    lowest: u32,
     /// Ways before this are not looked at: after a reversal the torque first takes up the lost motion.
     from: f64,
-    threshold: f64,
-    over: u32,
-    first: f64,
-    last: f64,
     window: f64,
+    threshold: f64,
+    frame: Frame,
+    /// At `begin`, `end`, and at the end of each part.
+    first: Mark,
+    past: Sums,
+    ends: [Mark; 4],
+    /// Of ways and torques in the first quarter of the window.
     early: Sums,
-    level: Sums,
-    line: Sums,
-    /// Lower half of the line.
-    low: Sums,
-    /// From block to block of the line, and its last block.
-    steps: Sums,
-    before: Option<(f64, f64)>,
-    /// Squares from block to block of the level, and its last block.
-    level_steps: f64,
-    level_before: Option<(f64, f64)>,
-    least: f64,
-    split: Contact,
+    /// Up to where splits are tried.
+    running: Sums,
+    /// What the line that begins at the group after the one at hand scatters.
+    behind: f64,
+    best: Best,
+    /// Length of its line.
+    length: f64,
+    parts: Parts,
     found: Result<Contact, Fault>,
+    /// Up to the start of each group; what the best split within it leaves at least.
+    groups: [Start; GROUPS + 1],
+    within: [f64; GROUPS + 1],
 }
 
 impl Default for Fit {
     fn default() -> Fit {
         Fit {
             stage: Stage::Ready,
+            cycles: 0,
+            rest: 0,
             at: 0,
+            begin: 0,
             end: 0,
+            last: 0,
+            lowest: 0,
             from: 0.0,
-            threshold: 0.0,
-            over: 0,
-            first: 0.0,
-            last: 0.0,
             window: 0.0,
+            threshold: 0.0,
+            frame: Frame::default(),
+            first: Mark::default(),
+            past: Sums::default(),
+            ends: [Mark::default(); 4],
             early: Sums::default(),
-            level: Sums::default(),
-            line: Sums::default(),
-            low: Sums::default(),
-            steps: Sums::default(),
-            before: None,
-            level_steps: 0.0,
-            level_before: None,
-            least: f64::INFINITY,
-            split: Contact::default(),
-            found: Err(Fault::of(GIB_ERR_HOMING_SHAPE)),
+            running: Sums::default(),
+            behind: 0.0,
+            best: Best { left: f64::INFINITY, corner: 0.0 },
+            length: 0.0,
+            parts: Parts::default(),
+            found: Err(lacks("blocks\0", 0.0, FEWEST)),
+            groups: [Start::default(); GROUPS + 1],
+            within: [0.0; GROUPS + 1],
         }
     }
 }
 
-/// Where a line of that slope through the middle of its blocks leaves the level, and the variance of that.
-fn start_of(line: &Sums, level: f64, slope: f64, scatter: f64) -> (f64, f64) {
-    let mean = line.x / line.n;
-    let way = mean - (line.t / line.n - level) / slope;
-    (way, scatter * (1.0 / line.n + (mean - way) * (mean - way) / line.spread().0) / (slope * slope))
+/// Place of a group among [`GROUPS`].
+fn place(group: u32) -> usize {
+    (group as usize).min(GROUPS - 1)
 }
 
 impl Fit {
     /// Begins: blocks at ways of `from` mm and up to `window` mm more count, up to where the torque reaches `threshold`.
     pub fn start(&mut self, from: f64, window: f64, threshold: f64) {
-        *self = Fit { stage: Stage::Gather, from, window, threshold, first: f64::INFINITY, ..Fit::default() };
+        (self.from, self.window, self.threshold) = (from, window, threshold);
+        self.stage = Stage::Window;
+        self.early = Sums::default();
+        (self.cycles, self.rest) = (0, 0);
     }
 
     /// Cycles that a fit takes at most.
     #[must_use]
     pub fn slices_bound() -> u32 {
-        3 * (BLOCKS as u32 / SLICE + 2)
+        let groups = GROUPS as u32;
+        let rest = 3 * (BLOCKS as u32).div_ceil(RESTED);
+        rest + 3 * groups + groups * SIZE.div_ceil(TRIED) + groups.div_ceil(PASSED) + 10
     }
 
     /// The contact, once ready.
@@ -207,8 +200,9 @@ impl Fit {
         self.found
     }
 
-    /// The slope of the torque in the first quarter of the window, where a dead stop shows its level, and the largest that is none: half
-    /// the pace that would bring it to the limit at the window's end, or chance. `None` where it is no more than that.
+    /// Where no contact was found: the slope of the torque in the first quarter of the window, where a dead stop shows its level, and the
+    /// largest that is none: half the pace that would bring it to the limit at the window's end, or chance. `None` where it is no more
+    /// than that.
     #[must_use]
     pub fn rises_early(&self) -> Option<[f64; 2]> {
         let early = &self.early;
@@ -221,248 +215,226 @@ impl Fit {
 
     /// One slice; true when ready.
     pub fn slice(&mut self, trace: &Trace) -> bool {
-        let to = (self.at + SLICE).min(if self.stage == Stage::Gather { trace.len() } else { self.end });
-        for i in self.at..to {
-            let block = trace.block(i);
-            if block.0 >= self.from {
-                match self.stage {
-                    Stage::Gather => self.gather(i, block),
-                    Stage::Scan => self.scan(block),
-                    Stage::Refine => self.refine(block),
-                    Stage::Ready => {}
-                }
-            }
+        match self.stage {
+            Stage::Window => self.find_window(trace),
+            Stage::Torques => self.sum_torques(trace),
+            Stage::Ways => self.sum_ways(trace),
+            Stage::Split => self.split(trace),
+            Stage::Ends => self.find_end(trace),
+            Stage::Solve => self.solve(),
+            Stage::Early => self.sum_early(trace),
+            Stage::Ready => {}
         }
-        let whole = self.at + SLICE >= if self.stage == Stage::Gather { trace.len() } else { self.end };
-        self.at = to;
-        if whole {
-            self.next_stage(trace.len());
-        }
-        self.stage == Stage::Ready
+        self.cycles += 1;
+        self.stage == Stage::Ready && self.cycles >= self.rest
     }
 
-    /// Sums blocks up to two in a row beyond the threshold: one alone may be noise.
-    #[inline(always)]
-    fn gather(&mut self, i: u32, block: (f64, f64)) {
-        if self.end > 0 {
-            return;
+    /// First block from `from` on, before `to`, that has gone `way` mm from the frame's origin.
+    fn first_at(&self, trace: &Trace, way: f64, mut from: u32, mut to: u32) -> u32 {
+        while from < to {
+            let middle = (from + to) / 2;
+            let short = trace.in_frame(&self.frame, middle).0 < way;
+            (from, to) = if short { (middle + 1, to) } else { (from, middle) };
         }
-        self.over = if block.1 >= self.threshold { self.over + 1 } else { 0 };
-        self.line.add(1.0, block);
-        if block.0 < self.from + 0.25 * self.window {
-            self.early.add(1.0, block);
-        }
-        self.first = self.first.min(block.0);
-        self.last = block.0;
-        if self.over == 2 {
-            self.end = i.saturating_sub(1).max(1);
-            self.line.add(-1.0, block);
-        }
+        from
     }
 
-    /// Moves a block from the line to the level and rates the split.
-    #[inline(always)]
-    fn scan(&mut self, block: (f64, f64)) {
-        self.line.add(-1.0, block);
-        self.level.add(1.0, block);
-        if self.level.n < FEWEST || self.line.n < FEWEST {
-            return;
-        }
-        let (slope, about_line) = self.line.line();
-        let about = self.level.scatter() + about_line;
-        if about < self.least && slope > 0.0 {
-            let level = self.level.t / self.level.n;
-            let way = self.line.x / self.line.n - (self.line.t / self.line.n - level) / slope;
-            self.least = about;
-            self.split = Contact { way, level, stiffness: slope, ..Contact::default() };
-        }
+    /// Sums up to block `i`.
+    fn mark(&self, trace: &Trace, i: u32) -> Mark {
+        let g = (i / SIZE).min(self.last);
+        let group = trace.group(g);
+        let n = i.saturating_sub(SIZE * g).min(SIZE);
+        let Start { sums, steps } = self.groups[place(g)].and_blocks(&self.frame, group, n as usize);
+        let mut across = steps;
+        across.add(&self.frame, group.pair(i));
+        Mark { sums, steps, across }
     }
 
-    /// Sums what is surely level and what is surely line.
-    #[inline(always)]
-    fn refine(&mut self, block: (f64, f64)) {
-        let along = block.0 - self.split.way;
-        let length = self.split.press;
-        if along < -LEVEL_GAP * length {
-            self.level.add(1.0, block);
-            if let Some((_, t)) = self.level_before {
-                self.level_steps += (block.1 - t) * (block.1 - t);
-            }
-            self.level_before = Some(block);
-        } else if along >= LINE_FROM * length && along <= LINE_TO * length {
-            let half = if along < LINE_HALF * length { &mut self.low } else { &mut self.line };
-            half.add(1.0, block);
-            if let Some((x, t)) = self.before {
-                self.steps.add(1.0, (block.0 - x, block.1 - t));
-            }
-            self.before = Some(block);
+    fn find_window(&mut self, trace: &Trace) {
+        let to = trace.lead() + trace.len();
+        self.frame = trace.frame_at_end();
+        self.parts.end = trace.last_way();
+        self.begin = self.first_at(trace, self.from - self.parts.end, trace.lead(), to);
+        (self.at, self.last) = (self.begin / SIZE, (to.max(1) - 1) / SIZE);
+        self.groups[place(self.at)] = Start::after(self.at * SIZE);
+        self.first = self.mark(trace, self.begin);
+        self.stage = Stage::Torques;
+    }
+
+    /// Sums torques up to two in a row beyond the threshold: one alone may be noise.
+    fn sum_torques(&mut self, trace: &Trace) {
+        let to = trace.lead() + trace.len();
+        if SIZE * self.at >= to {
+            return self.limited(trace, [to; 3]);
+        }
+        let at = place(self.at);
+        let before = self.groups[at];
+        let most = self.groups[at + 1].torques_after(&self.frame, trace.group(self.at), &before);
+        self.at += 1;
+        if most >= self.threshold * self.threshold {
+            self.look_for_limit(trace, to);
         }
     }
 
     #[cold]
-    fn next_stage(&mut self, blocks: u32) {
-        self.at = 0;
-        self.stage = match self.stage {
-            Stage::Gather => {
-                self.end = if self.end > 0 { self.end } else { blocks };
-                Stage::Scan
+    fn look_for_limit(&mut self, trace: &Trace, to: u32) {
+        let from = self.begin.max(SIZE * (self.at - 1));
+        let over = |i| trace.in_frame(&self.frame, i).1 >= self.threshold;
+        let mut before = from > self.begin && over(from - 1);
+        for i in from..to.min(SIZE * self.at) {
+            let now = over(i);
+            if before && now {
+                return self.limited(trace, [i - 1, i, i + 1]);
             }
-            Stage::Scan if self.least.is_finite() => {
-                self.split.press = self.last - self.split.way;
-                self.level = Sums::default();
-                self.line = Sums::default();
-                Stage::Refine
-            }
-            Stage::Scan if self.level.n >= 2.0 * FEWEST => {
-                self.found = Err(lacks("line_clear_ratio\0", 0.0, SURE));
-                Stage::Ready
-            }
-            Stage::Scan => {
-                self.found = Err(lacks("blocks\0", self.level.n, 2.0 * FEWEST));
-                Stage::Ready
-            }
-            Stage::Ready => Stage::Ready,
-            Stage::Refine => {
-                self.found = self.solve();
-                Stage::Ready
-            }
-        };
-    }
-
-    /// Squares of the steps from block to block about a line of that slope.
-    fn block_to_block(&self, slope: f64) -> f64 {
-        let s = &self.steps;
-        (s.tt - 2.0 * slope * s.xt + slope * slope * s.xx).max(0.0)
-    }
-
-    /// By how much the line's variance exceeds that of independent blocks: an axis that swings or sticks and slips on the
-    /// stop scatters about its line, but not from block to block.
-    fn hanging_together(&self, slope: f64, about_line: f64) -> f64 {
-        const MOST: f64 = 0.7;
-        inflation(self.block_to_block(slope) / about_line.max(f64::MIN_POSITIVE), MOST)
-    }
-
-    /// Peak of the torque's swing before contact: what the level scatters more than its noise from block to block, beyond chance.
-    fn swing(&self) -> f64 {
-        const PEAK: f64 = 1.5;
-        let n = self.level.n;
-        let noise = self.level_steps / (2.0 * (n - 1.0));
-        let beyond = self.level.scatter() / (n - 1.0) - (1.0 + 3.0 * (3.0 / n).sqrt()) * noise;
-        PEAK * beyond.max(0.0).sqrt()
-    }
-
-    /// Where the two halves of the line start, one less the other, and what of its variance is chance: the noise from block to
-    /// block. Nothing where a half is too short.
-    fn bend(&self, level: f64, slope: f64) -> (f64, f64) {
-        /// Of the whole line's slope; a half that is flatter, as by chance, starts nowhere.
-        const FLATTEST: f64 = 0.2;
-        let chance = 0.5 * self.block_to_block(slope) / self.steps.n;
-        let [low, high] = [&self.low, &self.line].map(|half| {
-            let own = half.line().0.max(FLATTEST * slope);
-            start_of(half, level, own, chance)
-        });
-        let bend = (high.0 - low.0, high.1 + low.1);
-        if self.low.n >= 3.0 && self.line.n >= 3.0 && bend.1.is_finite() { bend } else { (0.0, 0.0) }
-    }
-
-    /// Contact point and its variance from the refined sums, or why the curve is not a level and a line.
-    fn solve(&self) -> Result<Contact, Fault> {
-        let (level, line) = (&self.level, &self.low.and(&self.line));
-        let outside = |way| Err(Fault { high: self.last, ..lacks("contact_mm\0", way, self.first) });
-        if !(self.split.press > 0.0) {
-            return outside(self.split.way);
-        }
-        let fewer = level.n.min(line.n);
-        if fewer < FEWEST {
-            return Err(lacks("blocks\0", fewer, FEWEST));
-        }
-        let torque = level.t / level.n;
-        let (slope, about_line) = line.line();
-        let (sxx, _) = line.spread();
-        let scatter = (level.scatter() + about_line) / (level.n + line.n - 3.0);
-        let slope_error = (about_line / (line.n - 2.0) / sxx).sqrt();
-        // Not `<=`: a slope that is no number is no slope.
-        if !(slope > SURE * slope_error) {
-            let clear = slope / slope_error;
-            return Err(lacks("line_clear_ratio\0", if clear.is_finite() { clear } else { 0.0 }, SURE));
-        }
-        let scatter_line = about_line / (line.n - 2.0) * self.hanging_together(slope, about_line);
-        let (way, of_line) = start_of(line, torque, slope, scatter_line);
-        let of_level = level.scatter() / (level.n - 1.0) / level.n / (slope * slope);
-        let (bend, bend_variance) = self.bend(torque, slope);
-        let contact = Contact {
-            way,
-            variance: of_level + of_line,
-            level: torque,
-            stiffness: slope,
-            stiffness_error: slope_error,
-            bend,
-            bend_variance,
-            noise: scatter.sqrt(),
-            swing: self.swing() / slope,
-            press: (self.threshold - torque) / slope,
-            threshold_way: self.last,
-        };
-        let seen = way > self.first && way < self.last;
-        if seen { Ok(contact) } else { outside(way) }
-    }
-}
-
-/// What a level or a line has too little of.
-fn lacks(field: &'static str, value: f64, low: f64) -> Fault {
-    Fault { code: GIB_ERR_HOMING_SHAPE, field, value, low, high: f64::MAX }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    /// A clean touch: level, line with stiffness `k` from `corner` on, cut off at `limit`.
-    fn touch(level: f64, k: f64, corner: f64, limit: f64, noise: impl Fn(u32) -> f64) -> Trace {
-        let mut trace = Trace::default();
-        trace.start(1, 0.0, 1.0, 1.0);
-        for i in 0..1500 {
-            let way = 0.0005 * f64::from(i);
-            let torque = (level + k * (way - corner).max(0.0)).min(limit);
-            trace.add(way, torque + noise(i));
-            if torque >= limit {
-                break;
-            }
-        }
-        trace
-    }
-
-    fn fitted(trace: &Trace, threshold: f64) -> Option<Contact> {
-        let mut fit = Fit::default();
-        fit.start(0.1, 0.6, threshold);
-        let mut slices = 0;
-        while !fit.slice(trace) {
-            slices += 1;
-            assert!(slices < Fit::slices_bound());
-        }
-        fit.found().ok()
-    }
-
-    proptest! {
-        /// Without noise the corner is found whatever level, stiffness and limit are.
-        #[test]
-        fn corner_of_a_clean_touch(level in -2.0..3.0f64, k in 20.0..300.0f64, corner in 0.2..0.4f64, limit in 4.5..9.0f64) {
-            let contact = fitted(&touch(level, k, corner, limit, |_| 0.0), 0.9 * limit).unwrap();
-            prop_assert!((contact.way - corner).abs() < 2e-5, "{} of {corner}", contact.way);
-            prop_assert!((contact.stiffness / k - 1.0).abs() < 1e-3 && (contact.level - level).abs() < 1e-4);
+            before = now;
         }
     }
 
-    #[test]
-    fn no_stop_is_no_contact() {
-        let hash = |i: u32| f64::from(i.wrapping_mul(2_654_435_761) >> 16) / 65536.0 - 0.5;
-        assert_eq!(fitted(&touch(2.0, 0.0, 0.3, 9.0, hash), 8.0), None);
-        assert_eq!(fitted(&Trace::default(), 8.0), None);
+    /// What counts ends before block `end`; when splits are tried the line goes on to `past`, the first block beyond the threshold, and
+    /// where the threshold counts as reached is before `seen`.
+    #[cold]
+    fn limited(&mut self, trace: &Trace, [end, past, seen]: [u32; 3]) {
+        (self.end, self.last) = (end, past.saturating_sub(1) / SIZE);
+        let held = |to: u32| (to - trace.lead()).div_ceil(RESTED);
+        self.rest = held(trace.lead() + trace.len()) + 2 * held(end);
+        let way = |i| trace.in_frame(&self.frame, i).0;
+        (self.parts.first, self.parts.last) = (way(self.begin), way(seen.wrapping_sub(1)));
+        self.parts.threshold = self.threshold;
+        if end <= self.begin {
+            return self.fails(lacks("blocks\0", 0.0, 2.0 * FEWEST));
+        }
+        self.groups[place(self.last)].no_ways();
+        self.past = self.mark(trace, past).sums;
+        self.behind = 0.0;
+        self.at = self.last;
+        self.lowest = self.last;
+        self.best = Best { left: f64::INFINITY, corner: 0.0 };
+        self.stage = Stage::Ways;
     }
 
-    #[test]
-    fn a_falling_line_is_no_contact() {
-        assert_eq!(fitted(&touch(2.0, -60.0, 0.3, 9.0, |i| 1e-3 * f64::from(i % 3)), 8.0), None);
+    /// Sums the ways of the group before those that are, and tries the split at its start.
+    fn sum_ways(&mut self, trace: &Trace) {
+        let (g, at) = (self.at, place(self.at));
+        if g < self.last {
+            self.sum_group(trace, g);
+        }
+        self.lowest = g;
+        self.within[at] = self.behind;
+        let inside = SIZE * g > self.begin;
+        if inside {
+            let [level, line] = self.best.try_split(&self.first.sums, &self.groups[at].sums, &self.past);
+            self.within[at] += level;
+            self.behind = line;
+        }
+        if inside && self.behind <= self.best.left {
+            self.at = g - 1;
+        } else {
+            (self.at, self.stage) = (SIZE * g, Stage::Split);
+        }
+    }
+
+    /// Sums the ways of group `g`, which ends where those begin that are summed.
+    fn sum_group(&mut self, trace: &Trace, g: u32) {
+        let (at, group) = (place(g), trace.group(g));
+        let next = self.groups[at + 1];
+        self.groups[at].ways_before(&self.frame, group, &next);
+    }
+
+    /// Whether the ways are summed from block `i` on; sums those of one group more where they are not.
+    fn reaches(&mut self, trace: &Trace, i: u32) -> bool {
+        let all = i / SIZE >= self.lowest;
+        if !all {
+            self.lowest -= 1;
+            self.sum_group(trace, self.lowest);
+        }
+        all
+    }
+
+    /// Tries some splits within a group, where one may be the best.
+    fn split(&mut self, trace: &Trace) {
+        let mut g = self.at / SIZE;
+        if self.at.is_multiple_of(SIZE) {
+            let to = (g + PASSED).min(self.last + 1);
+            while g < to && self.within[place(g)] >= self.best.left {
+                g += 1;
+            }
+            self.at = g * SIZE;
+            if g > self.last {
+                return self.splits_tried();
+            }
+            if g == to {
+                return;
+            }
+            self.running = self.groups[place(g)].sums;
+        }
+        let (mut running, mut best) = (self.running, self.best);
+        for i in self.at..(self.at + TRIED).min(self.end) {
+            running.add(trace.in_frame(&self.frame, i));
+            best.try_split(&self.first.sums, &running, &self.past);
+        }
+        (self.running, self.best) = (running, best);
+        self.at += TRIED;
+    }
+
+    #[cold]
+    fn splits_tried(&mut self) {
+        let n = f64::from(self.end - self.begin);
+        self.length = self.parts.last - self.best.corner;
+        if self.best.left.is_infinite() {
+            let enough = n >= 2.0 * FEWEST;
+            let clear = lacks("line_clear_ratio\0", 0.0, SURE);
+            self.fails(if enough { clear } else { lacks("blocks\0", n, 2.0 * FEWEST) });
+        } else if !(self.length > 0.0) {
+            self.fails(self.parts.outside(self.best.corner));
+        } else {
+            (self.at, self.stage) = (0, Stage::Ends);
+        }
+    }
+
+    /// Finds where a part ends.
+    fn find_end(&mut self, trace: &Trace) {
+        let at = self.at as usize % ENDS.len();
+        let way = self.best.corner + ENDS[at] * self.length;
+        let i = self.first_at(trace, way, self.begin, self.end);
+        // Where the torque jumps, level and line meet before the split. Of the level no ways are needed.
+        if at > 0 && !self.reaches(trace, i) {
+            return;
+        }
+        self.ends[at] = self.mark(trace, i);
+        self.at += 1;
+        if self.at as usize == ENDS.len() {
+            self.stage = Stage::Solve;
+        }
+    }
+
+    #[cold]
+    fn solve(&mut self) {
+        let ([level_end, from, half, to], parts) = (&self.ends, &mut self.parts);
+        (parts.level, parts.line) = (level_end.sums.since(&self.first.sums), to.sums.since(&from.sums));
+        parts.level_steps = level_end.steps.since(&self.first.across);
+        parts.line_steps = to.steps.since(&from.across);
+        parts.halves = [half.sums.since(&from.sums), to.sums.since(&half.sums)];
+        match self.parts.solve() {
+            Ok(contact) => (self.found, self.stage) = (Ok(contact), Stage::Ready),
+            Err(fault) => self.fails(fault),
+        }
+    }
+
+    /// There is no contact point. Does the torque rise where it should not yet?
+    #[cold]
+    fn fails(&mut self, fault: Fault) {
+        self.found = Err(fault);
+        self.stage = if self.end > self.begin { Stage::Early } else { Stage::Ready };
+    }
+
+    /// Sums the ways of one group more, or of the first quarter.
+    fn sum_early(&mut self, trace: &Trace) {
+        if !self.reaches(trace, self.begin) {
+            return;
+        }
+        let quarter = self.from + 0.25 * self.window - self.parts.end;
+        let to = self.mark(trace, self.first_at(trace, quarter, self.begin, self.end));
+        self.early = to.sums.since(&self.mark(trace, self.begin).sums);
+        self.stage = Stage::Ready;
     }
 }

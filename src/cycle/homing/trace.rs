@@ -3,8 +3,31 @@
 /// Blocks that a trace holds; a power of two.
 pub const BLOCKS: usize = 2048;
 
+/// Blocks that are summed at once, and such groups in the ring.
+pub const GROUP: usize = 16;
+const GROUPS: usize = BLOCKS / GROUP;
+
 /// A block that never fills.
 const PAUSED: u32 = u32::MAX;
+
+/// Blocks side by side in memory, position and torque as read, and the block before them.
+#[derive(Debug, Clone, Copy)]
+#[expect(missing_docs, reason = "told above")]
+pub struct Group<'a> {
+    pub before: [f64; 2],
+    pub blocks: &'a [[f64; 2]; GROUP],
+}
+
+/// How positions and torques as read become ways from a place and torques toward the stop.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Frame {
+    /// Position from which ways count, mm.
+    pub origin: f64,
+    /// ±1: ways grow toward the stop.
+    pub sense: f64,
+    /// The same of torques.
+    pub torque_sense: f64,
+}
 
 /// Torque against way, oldest block first.
 #[derive(Debug, Clone)]
@@ -19,11 +42,28 @@ pub struct Trace {
     in_block: u32,
     position: f64,
     torque: f64,
-    origin: f64,
-    sense: f64,
-    torque_sense: f64,
+    frame: Frame,
     /// Position and torque as read.
     blocks: [[f64; 2]; BLOCKS],
+}
+
+impl Group<'_> {
+    /// Block `i`, and before it the one that was before.
+    #[must_use]
+    #[inline(always)]
+    pub fn pair(&self, i: u32) -> [[f64; 2]; 2] {
+        let i = i as usize % GROUP;
+        [if i == 0 { self.before } else { self.blocks[(i - 1) % GROUP] }, self.blocks[i]]
+    }
+}
+
+impl Frame {
+    /// Way and torque of a block.
+    #[must_use]
+    #[inline(always)]
+    pub fn of(&self, [position, torque]: [f64; 2]) -> (f64, f64) {
+        (self.sense * (position - self.origin), self.torque_sense * torque)
+    }
 }
 
 impl Default for Trace {
@@ -36,9 +76,7 @@ impl Default for Trace {
             in_block: 0,
             position: 0.0,
             torque: 0.0,
-            origin: 0.0,
-            sense: 1.0,
-            torque_sense: 1.0,
+            frame: Frame { origin: 0.0, sense: 1.0, torque_sense: 1.0 },
             blocks: [[0.0; 2]; BLOCKS],
         }
     }
@@ -48,7 +86,7 @@ impl Trace {
     /// Starts anew with blocks of `length` cycles, at least 1. Ways count from `origin` in the sense `sense` (±1); the
     /// torque is positive in that sense once multiplied with `torque_sense` (±1).
     pub fn start(&mut self, length: u32, origin: f64, sense: f64, torque_sense: f64) {
-        (self.origin, self.sense, self.torque_sense) = (origin, sense, torque_sense);
+        self.frame = Frame { origin, sense, torque_sense };
         self.length = length.max(1);
         self.full = self.length;
         self.share = 1.0 / f64::from(self.length);
@@ -126,9 +164,14 @@ impl Trace {
     pub fn noise(&self) -> f64 {
         const LAST: u32 = 32;
         let (to, mut squares) = (self.len(), 0.0);
-        for i in to.saturating_sub(LAST) + 2..to {
-            let bend = self.block(i).1 - 2.0 * self.block(i - 1).1 + self.block(i - 2).1;
+        let from = to.saturating_sub(LAST);
+        let torque = |i| self.block(i).1;
+        let (mut last, mut before) = (torque(from + 1), torque(from));
+        for i in from + 2..to {
+            let now = torque(i);
+            let bend = now - 2.0 * last + before;
             squares += bend * bend;
+            (last, before) = (now, last);
         }
         // Of white noise, 1 + 4 + 1 times its square.
         (squares / (6.0 * f64::from(LAST - 2)) * f64::from(self.length)).sqrt()
@@ -163,9 +206,44 @@ impl Trace {
     #[must_use]
     #[inline(always)]
     pub fn block(&self, i: u32) -> (f64, f64) {
-        let place = (self.written.wrapping_sub(self.len()).wrapping_add(i)) as usize & (BLOCKS - 1);
-        let [position, torque] = self.blocks[place];
-        (self.sense * (position - self.origin), self.torque_sense * torque)
+        self.frame.of(self.blocks[self.oldest().wrapping_add(i) as usize & (BLOCKS - 1)])
+    }
+
+    /// How many blocks were written before the oldest held.
+    #[inline(always)]
+    fn oldest(&self) -> u32 {
+        self.written.wrapping_sub(self.len())
+    }
+
+    /// Blocks of group 0 before the oldest held: these and those after the last are none of this touch.
+    #[must_use]
+    #[inline(always)]
+    pub fn lead(&self) -> u32 {
+        self.oldest() % GROUP as u32
+    }
+
+    /// Way and torque of block `i` in `frame`, counted from the start of group 0.
+    #[must_use]
+    #[inline(always)]
+    pub fn in_frame(&self, frame: &Frame, i: u32) -> (f64, f64) {
+        let start = self.oldest() & !(GROUP as u32 - 1);
+        frame.of(self.blocks[start.wrapping_add(i) as usize % BLOCKS])
+    }
+
+    /// Group `i`, that of the oldest block is 0; any `i` is safe to ask for.
+    #[must_use]
+    #[inline(always)]
+    pub fn group(&self, i: u32) -> Group<'_> {
+        let place = (self.oldest() / GROUP as u32).wrapping_add(i) as usize % GROUPS;
+        let (groups, _) = self.blocks.as_chunks::<GROUP>();
+        Group { before: self.blocks[(GROUP * place).wrapping_sub(1) % BLOCKS], blocks: &groups[place] }
+    }
+
+    /// The frame whose ways count from the last block.
+    #[must_use]
+    pub fn frame_at_end(&self) -> Frame {
+        let last = self.written.wrapping_sub(1) as usize % BLOCKS;
+        Frame { origin: self.blocks[last][0], ..self.frame }
     }
 }
 

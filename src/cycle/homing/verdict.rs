@@ -87,16 +87,16 @@ impl Touches {
     /// # Errors
     /// `GIB_ERR_HOMING_SHAPE`, `GIB_ERR_HOMING_SOFT_STOP`, `GIB_ERR_HOMING_NOISE`.
     pub fn add(&mut self, plan: &Plan, touch: u32, fit: &Fit, offset: f64) -> Result<(), Fault> {
-        match (fit.found(), fit.rises_early()) {
-            (Ok(contact), _) => self.keep(plan, touch, contact, offset),
-            // A fast approach leaves too few points for a line; the measured touches are slower.
-            (Err(_), None) if touch == 0 && plan.approach > plan.touch => Ok(()),
-            (Err(shape), None) => Err(shape),
-            (Err(_), Some(rise)) => {
-                let [value, high] = rise.map(|slope| slope * plan.torque_nm);
-                Err(Fault { code: GIB_ERR_HOMING_SOFT_STOP, field: "early_rise_nm_mm\0", value, low: 0.0, high })
-            }
+        let shape = match fit.found() {
+            Ok(contact) => return self.keep(plan, touch, contact, offset),
+            Err(shape) => shape,
+        };
+        if let Some(rise) = fit.rises_early() {
+            let [value, high] = rise.map(|slope| slope * plan.torque_nm);
+            return Err(Fault { code: GIB_ERR_HOMING_SOFT_STOP, field: "early_rise_nm_mm\0", value, low: 0.0, high });
         }
+        // A fast approach leaves too few points for a line; the measured touches are slower.
+        if touch == 0 && plan.approach > plan.touch { Ok(()) } else { Err(shape) }
     }
 
     fn keep(&mut self, plan: &Plan, touch: u32, contact: Contact, offset: f64) -> Result<(), Fault> {

@@ -229,7 +229,8 @@ impl Side {
     pub fn held_back(&self, plan: &Plan, level: f64, racked: impl Fn() -> Option<Fault>) -> Option<Fault> {
         let fault = |code, field, value, low, high| Some(Fault { code, field, value, low, high });
         // A stop pushes the axis back; a tight spot takes as much torque above what sliding takes both ways.
-        let low = self.sliding - 0.5 * (plan.threshold - level) - 4.0 * FILTERED * self.noise();
+        let noiseless = self.sliding - 0.5 * (plan.threshold - level);
+        let low = if self.lowest < noiseless { noiseless - 4.0 * FILTERED * self.noise() } else { noiseless };
         let (behind, most) = (self.profile.position - self.position, 0.5 * plan.retract);
         let (stayed, pulls) = (-plan.sense * behind > most, self.lowest <= -0.5 * plan.threshold);
         let held = self.sliding.max(self.filtered);

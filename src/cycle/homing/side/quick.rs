@@ -135,6 +135,11 @@ impl Side {
         }
         (self.low, self.high) = (plan.bound_below, self.trip);
         self.granted = ((way / speed - 4.0 - 2.0 * plan.acceleration / speed) as u32).min(left);
+        // Once the command has its speed the cycles are cheaper.
+        let lacks = speed - p.speed.copysign(p.speed * p.left());
+        if way > p.braking() && lacks > 0.0 {
+            self.granted = self.granted.min((lacks / plan.acceleration) as u32);
+        }
         if self.held {
             (self.low, self.high) = (plan.release, plan.bound);
             let next = if self.standing < plan.hold { plan.hold } else { plan.detection };
