@@ -48,9 +48,10 @@ impl<'f, 'a> Approach<'f, 'a> {
         if figure(&first.channels(&left(nearest))) > there.figure() - LEAST {
             return None;
         }
-        let mut part = first.approached(&there, nearest.clone(), *stride, MOVES);
+        let start = first.parts_under(nearest.law, vec![nearest.shape.clone()], &first.resistance_of(set)).pop()?;
+        let mut part = first.approached(&there, start, *stride, MOVES);
         for (bench, stride) in finer {
-            let start = bench.parts(part.law, vec![part.shape]).pop()?;
+            let start = bench.parts_like(&part, vec![part.shape.clone()]).pop()?;
             part = bench.approached(&bench.again(set), start, *stride, MOVES);
         }
         Some(part.shape)

@@ -3,7 +3,6 @@
 //! hard, and how far those lie apart that leave about as much is a part of the uncertainty. What hardness the machine is given is
 //! what predicts its torque best: an impact that is hard and comes a row too late errs twice.
 
-use super::causes::law;
 use super::fit::{Bench, Fit};
 use super::gain::HeldOut;
 use super::judge::{Excess, LITTLE_LEFT};
@@ -30,7 +29,7 @@ pub fn settled(bench: &Bench, held_out: &HeldOut, found: Selection, watch: &Watc
         if let Some(contact_hz) = shape.last_mut() {
             *contact_hz = hz;
         }
-        parts[at] = bench.parts(law(Cause::Backlash), vec![shape]).swap_remove(0);
+        parts[at] = bench.parts_like(&parts[at], vec![shape]).swap_remove(0);
         bench.fit(parts)
     };
     let stage = "letting the flanks meet softer and harder";

@@ -1,22 +1,22 @@
 //! Least squares over a set of causes: y = Σ fixed + Σ coefficient·regressor, torque and table − encoder stacked, each over
 //! its own noise floor, so that one sum of squares weighs both.
 //!
-//! Linear coefficients are projected out (orthonormal basis by modified Gram–Schmidt, twice); non-linear parameters go by
-//! Gauss–Newton with step halving on what is left (variable projection, Golub and Pereyra 1973).
+//! Linear coefficients are projected out (orthonormal basis by modified Gram–Schmidt, twice); non-linear parameters are refined on
+//! what is left (`refine`).
 
 mod beside;
 mod given;
+mod refine;
 mod slopes;
 mod smoothed;
 
 pub use beside::Beside;
 pub use slopes::Slope;
 
-use super::causes::{Law, Rest, Term, Trace};
+use super::causes::{Law, Resistance, Rest, Term, Trace};
 use super::frame::Frame;
 use super::known::Known;
 use super::many::{add, dot};
-use super::progress::{Stopped, Watch};
 use crate::machine::Effect;
 use crate::plant::linear::decomposed;
 use nalgebra::{DMatrix, DVector};
@@ -44,6 +44,8 @@ pub struct Bench<'f, 'a> {
     pub rows: usize,
     /// Orthonormal columns that are free in every fit: the zero of the table's scale.
     free: Vec<Vec<f64>>,
+    /// What the belief has that resists the table.
+    resistance: Arc<Resistance>,
     /// Judged rows that are summed to one; none where rows are as they are.
     windows: Vec<Range<usize>>,
 }
@@ -58,6 +60,8 @@ pub struct Part {
     // Shared: sets of causes are copied often, their columns never change.
     fixed: Option<Arc<[f64]>>,
     columns: Arc<[Vec<f64>]>,
+    /// Under what a table was simulated.
+    resistance: Arc<Resistance>,
     /// The part to either side of where it stands, once somebody has asked for it.
     sides: Arc<OnceLock<Vec<Side>>>,
 }
@@ -91,7 +95,8 @@ impl<'f, 'a> Bench<'f, 'a> {
         let rows = left.torque.len();
         let (doubt, measured, windows) = (Vec::new(), Vec::new(), Vec::new());
         let certain = vec![1.0; rows + left.table.len()];
-        let mut bench = Self { frame, measured, floors, doubt, certain, rows, free: Vec::new(), windows };
+        let (free, resistance) = (Vec::new(), known.resistance.clone());
+        let mut bench = Self { frame, measured, floors, doubt, certain, rows, free, resistance, windows };
         let doubt = bench.stack(&known.doubt);
         // A row errs by its noise and by what is believed there (generalised least squares).
         bench.certain = doubt.iter().map(|doubt| doubt.hypot(1.0).recip()).collect();
@@ -122,10 +127,23 @@ impl<'f, 'a> Bench<'f, 'a> {
     /// A cause at given non-linear parameters, once for each set of them.
     #[must_use]
     pub fn parts(&self, law: &'static Law, shapes: Vec<Vec<f64>>) -> Vec<Part> {
-        let terms = (law.terms)(self.frame, &shapes);
+        self.parts_under(law, shapes, &self.resistance)
+    }
+
+    /// A part at other non-linear parameters, once for each set of them.
+    #[must_use]
+    pub fn parts_like(&self, part: &Part, shapes: Vec<Vec<f64>>) -> Vec<Part> {
+        self.parts_under(part.law, shapes, &part.resistance)
+    }
+
+    /// A cause under what resists a table.
+    #[must_use]
+    pub fn parts_under(&self, law: &'static Law, shapes: Vec<Vec<f64>>, resistance: &Arc<Resistance>) -> Vec<Part> {
+        let terms = law.terms(self.frame, resistance, &shapes);
         let part = |(shape, Term { fixed, regressors }): (Vec<f64>, Term)| {
+            let fixed = fixed.map(|trace| self.stack(&trace).into());
             let columns = regressors.iter().map(|trace| self.stack(trace)).collect();
-            Part { law, shape, fixed: fixed.map(|trace| self.stack(&trace).into()), columns, sides: Arc::default() }
+            Part { law, shape, fixed, columns, resistance: resistance.clone(), sides: Arc::default() }
         };
         shapes.into_iter().zip(terms).map(part).collect()
     }
@@ -224,74 +242,6 @@ impl<'f, 'a> Bench<'f, 'a> {
             }
         }
         channel_squares(&residual, self.rows)
-    }
-
-    /// Refines the non-linear parameters of the parts from index `first` on, until a step brings nothing.
-    #[must_use]
-    pub fn refine(&self, fit: Fit, first: usize, most: usize) -> Fit {
-        self.refine_while(fit, first, most, 1e-5, |_| ())
-    }
-
-    /// The same of a set with nothing else to do beside it: on all cores at hand.
-    ///
-    /// # Errors
-    /// [`Stopped`] when the watch's caller said so.
-    pub fn refine_across(&self, fit: Fit, most: usize, watch: &Watch) -> Result<Fit, Stopped> {
-        let look_about = |fit: &Fit| {
-            let look = |part: &Part| _ = self.both_sides(part);
-            // Who says stop is heard after the fit.
-            _ = watch.each(&fit.parts, (0.8, 0.8), "fitting causes", look);
-        };
-        let fit = self.refine_while(fit, 0, most, 1e-5, look_about);
-        watch.at(0.8, "fitting causes").map(|()| fit)
-    }
-
-    /// The same until a step takes less than a thousandth off the squares: enough to compare sets of causes.
-    #[must_use]
-    pub fn refine_roughly(&self, fit: Fit, first: usize, most: usize) -> Fit {
-        self.refine_while(fit, first, most, 1e-3, |_| ())
-    }
-
-    fn refine_while(&self, mut fit: Fit, first: usize, most: usize, least: f64, look_about: impl Fn(&Fit)) -> Fit {
-        for _ in 0..most {
-            look_about(&fit);
-            let slopes = self.slopes(&fit, first);
-            if slopes.is_empty() {
-                break;
-            }
-            let steps = self.steps(&fit, &slopes);
-            let before = fit.squares();
-            let mut share = 1.0;
-            let mut better = None;
-            for _ in 0..4 {
-                let mut parts = fit.parts.clone();
-                let mut moved: Vec<usize> = Vec::new();
-                for (slope, step) in slopes.iter().zip(&steps) {
-                    let part = &mut parts[slope.part];
-                    let scale = part.law.scales[slope.index];
-                    part.shape[slope.index] = scale.moved(part.shape[slope.index], share * step);
-                    moved.push(slope.part);
-                }
-                moved.dedup();
-                for i in moved {
-                    let shape = vec![parts[i].shape.clone()];
-                    parts[i] = self.parts(parts[i].law, shape).swap_remove(0);
-                }
-                let next = self.fit(parts);
-                if next.squares() < before {
-                    better = Some(next);
-                    break;
-                }
-                share *= 0.3;
-            }
-            let Some(next) = better else { break };
-            let gained = 1.0 - next.squares() / before;
-            fit = next;
-            if gained < least {
-                break;
-            }
-        }
-        fit
     }
 
     /// The coefficients that the rows outside some blocks give, at the same non-linear parameters.

@@ -44,6 +44,6 @@ fn of_form(bench: &Bench, fit: &Fit, (part, index): (usize, usize), value: f64) 
     let mut parts = fit.parts.clone();
     let mut shape = parts[part].shape.clone();
     shape[index] = value;
-    parts[part] = bench.parts(parts[part].law, vec![shape]).swap_remove(0);
+    parts[part] = bench.parts_like(&parts[part], vec![shape]).swap_remove(0);
     bench.fit(parts)
 }

@@ -5,13 +5,14 @@
 //! the believed parameters. The phase of a periodic one belongs to the recording: sine and cosine are fitted to what the others
 //! leave, and their amplitude is the believed one.
 
-use super::causes::{Law, Trace, law, table_side};
+use super::causes::{Law, Resistance, Trace, law, table_side};
 use super::frame::Frame;
 use super::many::dot;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::physics::Physics;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// How exactly a law holds on a machine, as a share of what it makes near by.
 const LAW_HOLDS: f64 = 1.0 / 30.0;
@@ -31,6 +32,8 @@ pub struct Known {
     /// By how much its effects may be off there, because no law holds exactly, and the torque that was read, because its grid is
     /// coarse: a standard deviation.
     pub doubt: Trace,
+    /// What it has that resists the table.
+    pub resistance: Arc<Resistance>,
 }
 
 impl Known {
@@ -39,8 +42,9 @@ impl Known {
     pub fn of(axis: &Axis, frame: &Frame) -> Known {
         let trace = Trace { torque: frame.believed(), table: vec![0.0; frame.table_error().len()] };
         let doubt = Trace { torque: frame.coarse_torque(), table: vec![0.0; trace.table.len()] };
-        let mut known = Known { trace, doubt };
-        if let Some(apart) = table_side::believed(frame, axis) {
+        let resistance = Arc::new(Resistance::of(frame, axis));
+        let mut known = Known { trace, doubt, resistance };
+        if let Some(apart) = table_side::believed(frame, axis, &known.resistance) {
             let flanks = axis.effects.iter().any(|e| e.cause() == Cause::Backlash);
             known.add(frame, &[(&apart, 1.0)], [if flanks { IMPACT_HOLDS } else { LAW_HOLDS }, LAW_HOLDS]);
             if flanks {
@@ -54,19 +58,23 @@ impl Known {
                 continue;
             }
             let Some((shape, coefficients)) = by_its_law(frame, effect) else { continue };
-            let regressors = regressors(frame, effect, shape);
+            let regressors = known.regressors(frame, effect, shape);
             known.add(frame, &regressors.iter().zip(coefficients).collect::<Vec<_>>(), [LAW_HOLDS; 2]);
         }
         for effect in periodic {
             let Some((shape, coefficients)) = by_its_law(frame, effect) else { continue };
             if let ([sine, cosine], [amplitude]) =
-                (regressors(frame, effect, shape).as_slice(), coefficients.as_slice())
+                (known.regressors(frame, effect, shape).as_slice(), coefficients.as_slice())
             {
                 let (a, b) = phase(frame, &known.trace, sine, cosine);
                 known.add(frame, &[(sine, amplitude * a), (cosine, amplitude * b)], [LAW_HOLDS; 2]);
             }
         }
         known
+    }
+
+    fn regressors(&self, frame: &Frame, effect: &Effect, shape: Vec<f64>) -> Vec<Trace> {
+        law(effect.cause()).terms(frame, &self.resistance, &[shape]).swap_remove(0).regressors
     }
 
     /// Adds an effect as traces with their factors; it holds so exactly in torque and table − encoder.
@@ -139,10 +147,6 @@ fn build_up(frame: &Frame, physics: &Physics) -> Trace {
         }
     }
     Trace::torque(frame.judged(&short))
-}
-
-fn regressors(frame: &Frame, effect: &Effect, shape: Vec<f64>) -> Vec<Trace> {
-    (law(effect.cause()).terms)(frame, &[shape]).swap_remove(0).regressors
 }
 
 /// Whether an effect is periodic: its phase is the recording's own.

@@ -39,6 +39,7 @@ pub mod select;
 pub mod show;
 mod shrink;
 pub mod uncertainty;
+mod valleys;
 pub mod verdict;
 
 pub use choice::axis_of;

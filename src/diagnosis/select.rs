@@ -15,6 +15,7 @@ use super::judge::{Excess, LITTLE_LEFT};
 use super::many::add;
 use super::progress::{Stopped, Watch};
 use super::shrink::{idle_left_out, shrink};
+use super::valleys;
 use crate::machine::Cause;
 use std::collections::{HashMap, HashSet};
 
@@ -22,6 +23,8 @@ use std::collections::{HashMap, HashSet};
 const BEAM: usize = 2;
 /// Causes refined for each set that grows.
 const TRIED: usize = 6;
+/// Of the starts of a law that turns a table round in another way, which is simulated anew for each, one in so many is tried.
+const EVERY: usize = 2;
 /// Most causes in a set.
 const MOST: usize = 6;
 /// Starts of a law that are laid out in one go; springs are stepped as many side by side.
@@ -158,6 +161,7 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     let open = idle_left_out(search.bench, search.with_beliefs(&start), search.watch)?;
     let start = if price(&open) < price(&start) { open } else { start };
     let fit = shrink(search.bench, start, search.watch)?;
+    let fit = valleys::settled(search.bench, search.laws, fit, search.watch)?;
     rivals.retain(|r| r.parts.len() == fit.parts.len() && !same_causes(r, &fit));
     let plain = Selection { fit, rivals, alike: Vec::new() };
     let found = formulation::settled(search.bench, plain, search.watch)?;
@@ -240,10 +244,10 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
     // Simulations take longest. Beside causes without one they are asked where no law that is worked out row by row is to be
     // carried on and halves what is left, or leaves little: beside one that is they are asked next, which shows what only
     // imitates them.
-    let simulated = |set: &Fit| set.parts.iter().any(|part| part.law.manner.simulated);
+    let simulated = |set: &Fit| set.parts.iter().any(|part| part.law.is_simulated());
     let asked_last = beam.iter().all(|set| !set.parts.is_empty() && !simulated(set));
     let (mut first, last): (Vec<_>, Vec<_>) =
-        open.partition(|(_, law): &(&Fit, &Law)| !(asked_last && law.manner.simulated));
+        open.partition(|(_, law): &(&Fit, &Law)| !(asked_last && law.is_simulated()));
     // What takes longest is begun first, lest a core have nothing left to do beside it.
     first.sort_by_key(|(_, law)| !law.manner.approached);
     let half = if last.is_empty() { to } else { 0.5 * (from + to) };
@@ -290,7 +294,7 @@ fn with_one_more(
         *count += 1;
         *count <= TRIED && child.within_reach() < carried_on
     });
-    children.sort_by_key(|child| !child.part.law.manner.simulated);
+    children.sort_by_key(|child| !child.part.law.is_simulated());
     let fits =
         watch.each(&children, (half, to), FITTING, |Child { set, part, .. }| refined(bench, set, part.clone()))?;
     let (within, strayed): (Vec<_>, Vec<_>) =
@@ -345,12 +349,26 @@ fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Vec<C
     } else {
         shelved()
     };
-    let figure_with = |part: &Part| figure(&bench.joined(set, part)) + NUMBER_PRICE * part.free_parameters() as f64;
+    let numbers = |part: &Part| NUMBER_PRICE * part.free_parameters() as f64;
+    let figure_with = |part: &Part| figure(&bench.joined(set, part)) + numbers(part);
+    // What resists a simulated table is another with a friction more, and only then shows what that friction is worth.
+    let beside_table = set.parts.iter().any(|p| p.law.is_simulated()) || law.is_simulated() && !set.parts.is_empty();
+    let at_one = |part: &Part| {
+        let parts = set.parts.iter().chain([part]).cloned().collect();
+        bench.at_one(bench.fit(parts)).figure() + numbers(part)
+    };
     let best = |few: bool| {
         let alike = parts.iter().filter(|part| few_periods(part) == few);
-        let (figure, part) = alike.map(|part| (figure_with(part), part)).min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let worth = figure < set.figure() - if few { LEAST_OF_FEW } else { LEAST_AT_START };
-        worth.then(|| Child { set, part: part.clone(), price: price(set) + figure - set.figure() })
+        let mut start = alike.map(|part| (figure_with(part), part)).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let least = set.figure() - if few { LEAST_OF_FEW } else { LEAST_AT_START };
+        if beside_table && law.manner.turns_table {
+            let all = parts.iter().step_by(EVERY).map(|part| (at_one(part), part));
+            start = all.chain([start]).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        } else if beside_table && start.0 < least {
+            start.0 = start.0.min(at_one(start.1));
+        }
+        let (figure, part) = start;
+        (figure < least).then(|| Child { set, part: part.clone(), price: price(set) + figure - set.figure() })
     };
     // There is one ripple of few periods at most.
     let has_few = set.parts.iter().any(|part| part.law.cause == law.cause && few_periods(part));
@@ -360,7 +378,7 @@ fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Vec<C
 fn may_join(set: &Fit, law: &Law) -> bool {
     let same = set.parts.iter().filter(|p| p.law.cause == law.cause).count();
     // What stands between motor and table is one thing: two simulations do not add up.
-    if law.manner.simulated && set.parts.iter().any(|p| p.law.manner.simulated) {
+    if law.is_simulated() && set.parts.iter().any(|p| p.law.is_simulated()) {
         return false;
     }
     // A wave with a harmonic and one more, or one whose size swells and sinks (a line with one on either side). Two tight spots

@@ -77,7 +77,7 @@ pub fn strengths(bench: &Bench, fit: &Fit) -> Vec<f64> {
     let strength = |(i, part): (usize, &Part)| {
         let c = &fit.coefficients[i];
         let strength = if c.is_empty() { of_first(i, part) } else { of_coefficients(coefficient_at[i], c) };
-        if part.law.manner.simulated { strength / misfit } else { strength }
+        if part.law.is_simulated() { strength / misfit } else { strength }
     };
     fit.parts.iter().enumerate().map(strength).collect()
 }
@@ -101,14 +101,14 @@ pub fn of_unknowns(bench: &Bench, fit: &Fit) -> Sure {
     let mut widened = Vec::with_capacity(columns.len());
     let mut open = Vec::with_capacity(columns.len());
     for (part, own) in fit.parts.iter().zip(&fit.coefficients) {
-        let widening = if part.law.manner.simulated { simulated } else { 1.0 };
+        let widening = if part.law.is_simulated() { simulated } else { 1.0 };
         widened.extend(own.iter().map(|_| widening));
         open.extend(own.iter().map(|c| (LAW_HOLDS * c).powi(2)));
     }
     for Slope { part, index, .. } in &slopes {
         let (part, alone) = (&fit.parts[*part], fit.coefficients[*part].is_empty());
         let (scale, at) = (part.law.scales[*index], part.shape[*index]);
-        widened.push(if part.law.manner.simulated { simulated } else { 1.0 });
+        widened.push(if part.law.is_simulated() { simulated } else { 1.0 });
         let holds = if alone { LAW_HOLDS * at.abs() / scale.rate(at) } else { 0.0 };
         open.push(holds.hypot(scale.stopped_between(at).map_or(0.0, |range| range / 1.96)).powi(2));
     }
@@ -133,7 +133,7 @@ pub fn effects(bench: &Bench, fit: &Fit, sure: Option<&Sure>) -> Vec<Option<(Eff
     let unknowns = first_slope + shapes.len();
     let deviation_of = |part: &Part, gradient: &DVector<f64>| match (&by_blocks, sure) {
         (Some((spread, misfit)), _) => {
-            let widened = if part.law.manner.simulated { SIMULATED * misfit } else { 1.0 };
+            let widened = if part.law.is_simulated() { SIMULATED * misfit } else { 1.0 };
             widened * spread.deviation(gradient)
         }
         (None, Some(sure)) => gradient.dot(&(&sure.covariance * gradient)).max(0.0).sqrt(),

@@ -20,14 +20,17 @@ pub static LAW: Law = Law {
         // A width that is a fifth off meets the flanks at the wrong time and explains little.
         let least = (3.0 * frame.grid).max(2e-3) * 1e3;
         let widths = log_spaced(least, (10.0 * least).max(300.0), 12);
-        let at = |w| [0.33, 0.52].map(|table| [0.5, 0.67, 0.84].map(|friction| vec![w, table, friction, 700.0]));
-        widths.flat_map(|w| at(w).into_iter().flatten()).collect()
+        widths.flat_map(|width| of_width(width)).collect()
     },
-    manner: Manner { approached: true, simulated: true, ..PLAIN },
-    terms: |frame, shapes| {
+    manner: Manner {
+        approached: true,
+        valleys: |shape| shape.first().map_or_else(Vec::new, |width| of_width(*width).collect()),
+        ..PLAIN
+    },
+    terms: Terms::Simulated(|frame, resistance, shapes| {
         let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(shape)).collect();
-        table_side::terms(frame, &effects)
-    },
+        table_side::terms(frame, resistance, &effects)
+    }),
     // Within three steps of the encoder a turn is no crossing.
     effect: |frame, shape, _| effect(shape).filter(|_| shape.first().is_some_and(|width| *width > 3e3 * frame.grid)),
     confused_with: &[Cause::PreslidingFriction, Cause::DriveCompliance],
@@ -40,6 +43,12 @@ pub static LAW: Law = Law {
         _ => String::new(),
     },
 };
+
+/// Starts with a width.
+fn of_width(width: f64) -> impl Iterator<Item = Vec<f64>> {
+    let shares = [0.33, 0.52].into_iter().flat_map(|table| [0.5, 0.67, 0.84].map(|friction| (table, friction)));
+    shares.map(move |(table, friction)| vec![width, table, friction, 700.0])
+}
 
 fn effect(shape: &[f64]) -> Option<Effect> {
     let [width_um, table_inertia_share, table_friction_share, contact_hz] = shape.try_into().ok()?;

@@ -8,13 +8,13 @@ pub static LAW: Law = Law {
     scales: &[Scale::Choice],
     starts: |_, _| vec![vec![0.0], vec![1.0]],
     manner: PLAIN,
-    terms: |frame, shapes| {
+    terms: Terms::ByRows(|frame, shapes| {
         each(shapes, |shape| {
             let line = Trace::torque(frame.kept.iter().map(|&i| frame.x[i]).collect());
             let level = Trace::torque(vec![1.0; frame.kept.len()]);
             Term { fixed: None, regressors: if shape[0] > 0.5 { vec![line, level] } else { vec![line] } }
         })
-    },
+    }),
     effect: |frame, _, c| {
         let slope = *c.first()?;
         let zero_mm = c.get(1).map_or(0.0, |level| -level / slope);

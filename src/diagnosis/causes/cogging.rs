@@ -9,13 +9,13 @@ pub static LAW: Law = Law {
     scales: &[Scale::Linear(1.0, 1e6, 0.02)],
     starts: |frame, rest| periods::along_stroke(frame, rest.torque),
     manner: Manner { starts_from_rest: true, ..PLAIN },
-    terms: |frame, shapes| {
+    terms: Terms::ByRows(|frame, shapes| {
         each(shapes, |shape| {
             let (sine, cosine) = periods::waves(frame, shape[0]);
             let (sine, cosine) = (frame.judged_instants(&sine), frame.judged_instants(&cosine));
             Term { fixed: None, regressors: vec![Trace::torque(sine), Trace::torque(cosine)] }
         })
-    },
+    }),
     effect: |frame, shape, c| {
         let (amplitude, period_mm) = periods::ripple(frame, *shape.first()?, c.try_into().ok()?)?;
         Some(Effect::Cogging { amplitude, period_mm })

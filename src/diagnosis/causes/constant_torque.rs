@@ -8,7 +8,7 @@ pub static LAW: Law = Law {
     scales: &[],
     starts: one_start,
     manner: PLAIN,
-    terms: |frame, shapes| each(shapes, |_| Term::torque(vec![1.0; frame.kept.len()])),
+    terms: Terms::ByRows(|frame, shapes| each(shapes, |_| Term::torque(vec![1.0; frame.kept.len()]))),
     effect: |frame, _, c| Some(Effect::ConstantTorque { torque: frame.belief.constant + c.first()? }),
     confused_with: &[Cause::CableForce, Cause::DirectionDependentFriction],
     sentence: |effect, axis| match effect {

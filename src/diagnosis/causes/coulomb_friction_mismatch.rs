@@ -8,7 +8,7 @@ pub static LAW: Law = Law {
     scales: &[],
     starts: one_start,
     manner: PLAIN,
-    terms: |frame, shapes| each(shapes, |_| Term::torque(frame.judged(&frame.direction))),
+    terms: Terms::ByRows(|frame, shapes| each(shapes, |_| Term::torque(frame.judged(&frame.direction)))),
     effect: |frame, _, c| {
         let torque = frame.belief.coulomb + c.first()?;
         (torque >= 0.0).then_some(Effect::CoulombFrictionMismatch { torque })

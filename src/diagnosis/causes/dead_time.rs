@@ -19,14 +19,14 @@ pub static LAW: Law = Law {
         (-count..=count).filter(|i| *i != 0).map(|i| vec![f64::from(i) * step]).collect()
     },
     manner: PLAIN,
-    terms: |frame, shapes| {
+    terms: Terms::ByRows(|frame, shapes| {
         let torque = frame.torque(0.0);
         each(shapes, |shape| {
             let moved = frame.torque(1e-3 * shape[0]);
             let fixed = torque.iter().zip(moved).map(|(a, b)| a - b).collect();
             Term { fixed: Some(Trace::torque(fixed)), regressors: Vec::new() }
         })
-    },
+    }),
     effect: |frame, shape, _| {
         let late_s = |more_ms: f64| frame.lateness.delay_of(frame.believed_late_s + 1e-3 * more_ms);
         Some(Effect::DeadTime { delay_ms: 1e3 * (late_s(*shape.first()?) - late_s(0.0)) })

@@ -8,7 +8,9 @@ pub static LAW: Law = Law {
     scales: &[],
     starts: one_start,
     manner: PLAIN,
-    terms: |frame, shapes| each(shapes, |_| Term::torque(frame.judged_by(|i| (frame.v[i] * frame.unit).abs()))),
+    terms: Terms::ByRows(|frame, shapes| {
+        each(shapes, |_| Term::torque(frame.judged_by(|i| (frame.v[i] * frame.unit).abs())))
+    }),
     effect: |_, _, c| Some(Effect::DirectionDependentFriction { asymmetry: *c.first()? }),
     confused_with: &[Cause::ConstantTorque, Cause::QuadraticDrag],
     sentence: |effect, axis| match effect {

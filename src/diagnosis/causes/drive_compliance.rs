@@ -57,13 +57,21 @@ pub static LAW: Law = Law {
             let at = |share: f64| [0.5, 0.95].map(|friction| vec![own, share, friction / share, DAMPING]);
             [0.2, 0.45, 0.7, 0.85].into_iter().flat_map(at).collect()
         },
-        simulated: true,
+        // It winds up as far under less of the friction with less of the stiffness, whatever the table's mass.
+        valleys: |shape| {
+            let &[own, _, rubbing, _] = shape else { return Vec::new() };
+            let less = [0.25, 0.35, 0.5, 0.7, 1.0, 1.4]
+                .into_iter()
+                .flat_map(|less: f64| [0.25, 0.5, 0.75].map(|share| (less, share)));
+            let at = less.map(|(less, share)| vec![own * less.sqrt(), share, rubbing * less, DAMPING]);
+            at.filter(|shape| shape[1] * shape[2] <= MOST_FRICTION).collect()
+        },
         ..PLAIN
     },
-    terms: |frame, shapes| {
+    terms: Terms::Simulated(|frame, resistance, shapes| {
         let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(frame, shape)).collect();
-        table_side::terms(frame, &effects)
-    },
+        table_side::terms(frame, resistance, &effects)
+    }),
     effect: |frame, shape, _| {
         let swings = |found: &Effect| matches!(found, Effect::DriveCompliance { damping_ratio, .. } if *damping_ratio < 0.9 * MOST_DAMPING);
         effect(frame, shape).filter(swings)

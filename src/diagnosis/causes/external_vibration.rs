@@ -9,7 +9,7 @@ pub static LAW: Law = Law {
     scales: &[Scale::Linear(3.0, 1e9, 0.02)],
     starts: |frame, rest| periods::along_time(frame, rest.torque),
     manner: Manner { starts_from_rest: true, ..PLAIN },
-    terms: |frame, shapes| {
+    terms: Terms::ByRows(|frame, shapes| {
         each(shapes, |shape| {
             let per_second = shape[0] / duration(frame);
             let turns: Vec<f64> = (0..frame.x.len()).map(|i| per_second * frame.seconds(i)).collect();
@@ -17,7 +17,7 @@ pub static LAW: Law = Law {
             let (sine, cosine) = (frame.judged_instants(&sine), frame.judged_instants(&cosine));
             Term { fixed: None, regressors: vec![Trace::torque(sine), Trace::torque(cosine)] }
         })
-    },
+    }),
     effect: |frame, shape, c| {
         let [sine, cosine] = c.try_into().ok()?;
         let frequency_hz = shape.first()? / duration(frame);

@@ -8,7 +8,7 @@ pub static LAW: Law = Law {
     scales: &[],
     starts: one_start,
     manner: PLAIN,
-    terms: |frame, shapes| each(shapes, |_| Term::torque(frame.acceleration.clone())),
+    terms: Terms::ByRows(|frame, shapes| each(shapes, |_| Term::torque(frame.acceleration.clone()))),
     effect: |frame, _, c| {
         let inertia = frame.belief.inertia + c.first()?;
         (inertia > 0.1 * frame.belief.inertia).then_some(Effect::InertiaMismatch { inertia })

@@ -27,6 +27,7 @@ pub(super) mod thermal_drift;
 
 use super::frame::Frame;
 use crate::machine::{Axis, Cause, Effect};
+pub use table_side::Resistance;
 
 /// A regressor at the judged rows: what one unit of a coefficient adds.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -95,16 +96,32 @@ pub struct Rest<'a> {
 pub struct Manner {
     /// Starts anew from where a fit has strayed beyond the bounds, by what it has found all the same.
     pub restarts: fn(&[f64]) -> Vec<Vec<f64>>,
+    /// Where other valleys may be, by the bottom of one.
+    pub valleys: fn(&[f64]) -> Vec<Vec<f64>>,
     /// Whether the starts depend on what is left.
     pub starts_from_rest: bool,
     /// Whether the sum of squares is so rugged about the right parameters that they are approached from afar.
     pub approached: bool,
-    /// Whether the trace is a simulation of what happens between the rows.
-    pub simulated: bool,
+    /// Whether a table behind a spring or a clearance turns round in quite another way with it.
+    pub turns_table: bool,
 }
 
 /// That of a law that does not stray, with a trace that is worked out row by row, from starts that the recording gives.
-const PLAIN: Manner = Manner { restarts: |_| Vec::new(), starts_from_rest: false, approached: false, simulated: false };
+const PLAIN: Manner = Manner {
+    restarts: |_| Vec::new(),
+    valleys: |_| Vec::new(),
+    starts_from_rest: false,
+    approached: false,
+    turns_table: false,
+};
+
+/// How traces are come by, one for each set of non-linear parameters.
+pub enum Terms {
+    /// Worked out row by row.
+    ByRows(fn(&Frame, &[Vec<f64>]) -> Vec<Term>),
+    /// Simulated between the rows, under what resists the table.
+    Simulated(fn(&Frame, &Resistance, &[Vec<f64>]) -> Vec<Term>),
+}
 
 /// One cause.
 pub struct Law {
@@ -116,8 +133,8 @@ pub struct Law {
     pub starts: fn(&Frame, &Rest) -> Vec<Vec<f64>>,
     /// How it is looked for.
     pub manner: Manner,
-    /// The traces at given non-linear parameters, one for each set of them.
-    pub terms: fn(&Frame, &[Vec<f64>]) -> Vec<Term>,
+    /// The traces at given non-linear parameters.
+    pub terms: Terms,
     /// The effect that parameters and coefficients stand for; `None` beyond physical bounds.
     pub effect: fn(&Frame, &[f64], &[f64]) -> Option<Effect>,
     /// What leaves a similar trace.
@@ -127,6 +144,21 @@ pub struct Law {
 }
 
 impl Law {
+    /// The traces at given non-linear parameters, one for each set of them.
+    #[must_use]
+    pub fn terms(&self, frame: &Frame, resistance: &Resistance, shapes: &[Vec<f64>]) -> Vec<Term> {
+        match self.terms {
+            Terms::ByRows(terms) => terms(frame, shapes),
+            Terms::Simulated(terms) => terms(frame, resistance, shapes),
+        }
+    }
+
+    /// Whether the traces are a simulation of what happens between the rows.
+    #[must_use]
+    pub fn is_simulated(&self) -> bool {
+        matches!(self.terms, Terms::Simulated(_))
+    }
+
     /// Whether a parameter is one of form, and as usual: it is not fitted then.
     #[must_use]
     pub fn is_as_usual(&self, index: usize, value: f64) -> bool {

@@ -26,13 +26,13 @@ pub static LAW: Law = Law {
         bells.chain(lasting).collect()
     },
     manner: PLAIN,
-    terms: |frame, shapes| {
+    terms: Terms::ByRows(|frame, shapes| {
         each(shapes, |shape| {
             let (centre, width) = place(frame, shape);
             let per = 1.0 / width;
             Term::torque(frame.fading_by(&frame.x, shape[2], move |x| (x - centre) * per))
         })
-    },
+    }),
     effect: |frame, shape, c| {
         let (centre_mm, width_mm) = place(frame, shape);
         let peak = *c.first()?;

@@ -29,15 +29,15 @@ const fn with_exponent(scales: &'static [Scale]) -> Law {
             let of = |[n, kind]: [f64; 2]| widths.clone().map(move |d| vec![d, n, kind]);
             of(BRISTLE).chain(of(ELEMENTS).step_by(2)).collect()
         },
-        manner: PLAIN,
-        terms: |frame, shapes| {
+        manner: Manner { turns_table: true, ..PLAIN },
+        terms: Terms::ByRows(|frame, shapes| {
             each(shapes, |shape| {
                 let [mut less, rate] = build_up(frame, shape[0] * 1e-3, shape[1], is_of_elements(shape[2]));
                 less.iter_mut().zip(&frame.direction).for_each(|(z, direction)| *z -= direction);
                 let regressors = [less, rate].map(|values| Trace::torque(frame.judged(&values))).into();
                 Term { fixed: None, regressors }
             })
-        },
+        }),
         effect: |frame, shape, c| {
             let level = *c.first()?;
             let [displacement_um, exponent, maxwell_slip] = shape.try_into().ok()?;

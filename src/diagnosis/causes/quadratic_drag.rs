@@ -8,7 +8,9 @@ pub static LAW: Law = Law {
     scales: &[],
     starts: one_start,
     manner: PLAIN,
-    terms: |frame, shapes| each(shapes, |_| Term::torque(frame.judged_by(|i| 1e-6 * frame.v[i] * frame.v[i].abs()))),
+    terms: Terms::ByRows(|frame, shapes| {
+        each(shapes, |_| Term::torque(frame.judged_by(|i| 1e-6 * frame.v[i] * frame.v[i].abs())))
+    }),
     effect: |_, _, c| Some(Effect::QuadraticDrag { drag: *c.first()? }),
     confused_with: &[Cause::ViscousFrictionMismatch],
     sentence: |effect, axis| match effect {

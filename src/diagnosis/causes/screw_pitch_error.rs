@@ -8,12 +8,12 @@ pub static LAW: Law = Law {
     scales: &[],
     starts: |_, rest| if rest.table.is_empty() { Vec::new() } else { vec![Vec::new()] },
     manner: PLAIN,
-    terms: |frame, shapes| {
+    terms: Terms::ByRows(|frame, shapes| {
         each(shapes, |_| Term {
             fixed: None,
             regressors: vec![Trace::table(frame.kept.iter().map(|&i| 1e-6 * frame.x[i]).collect())],
         })
-    },
+    }),
     effect: |_, _, c| Some(Effect::ScrewPitchError { scale_um_m: *c.first()? }),
     confused_with: &[Cause::ScrewPeriodicError],
     sentence: |effect, _| match effect {

@@ -15,12 +15,12 @@ pub static LAW: Law = Law {
         log_spaced(2e-3 * top, 0.4 * top, 12).map(|v| vec![v, GAUSSIAN]).collect()
     },
     manner: PLAIN,
-    terms: |frame, shapes| {
+    terms: Terms::ByRows(|frame, shapes| {
         each(shapes, |shape| {
             let per = 1.0 / shape[0];
             Term::torque(frame.fading_by(&frame.v, shape[1], move |v| v * per))
         })
-    },
+    }),
     effect: |frame, shape, c| {
         let (torque, velocity_mm_s, exponent) = (*c.first()?, shape[0], shape[1]);
         let sound = torque > -1.2 * frame.belief.coulomb && velocity_mm_s < 0.6 * frame.top_speed();

@@ -1,34 +1,39 @@
 //! The table behind a spring or a clearance, driven by the measured motion of the motor.
 //!
 //! J₂·ẍ₂ = c − φ·(Tc·Sign(ẋ₂) + Tv·ẋ₂) − T0, with c = k·(x₁ − x₂) + d·(ẋ₁ − ẋ₂) beyond the dead zone; the motor then needs
-//! T = J₁·ẍ₁ + (1 − φ)·(Tc·sign(ẋ₁) + Tv·ẋ₁) + c. Integrated by Moreau's time stepping: friction is the impulse that
-//! brings the table towards rest, at most φ·Tc·h, so that a table at rest stays there without chatter. Between rows the
+//! T = J₁·ẍ₁ + (1 − φ)·(Tc·sign(ẋ₁) + Tv·ẋ₁) + c. Tc and T0 are those of each row, see [`Resistance`]. Integrated by Moreau's
+//! time stepping: friction is the impulse that brings the table towards rest, at most φ·Tc·h, so that a table at rest stays there
+//! without chatter; where friction builds up over a way, it is what that makes of the table's own. Between rows the
 //! motor goes along the cubic of its positions and speeds: a straight line would take (ω·h)²/12 off what swings at ω, which
 //! looks like another inertia. The motion is as the encoder shows it: what smooths it takes the impacts off, and the table's
 //! torque comes out too small.
 
 mod flanks;
+mod resistance;
 mod spring;
+
+pub use resistance::Resistance;
 
 use super::*;
 use crate::diagnosis::many::widest;
 use crate::diagnosis::sampling::NUMEROV;
 use crate::machine::TwoMasses;
+use crate::plant::friction::Friction;
 use spring::MOST_STEPS;
 use std::cell::RefCell;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// The traces in the torque (against the rigid axis) and in table − encoder, of each effect.
-pub fn terms(frame: &Frame, effects: &[Option<Effect>]) -> Vec<Term> {
+pub fn terms(frame: &Frame, resistance: &Resistance, effects: &[Option<Effect>]) -> Vec<Term> {
     let split = |e: &Option<Effect>| e.and_then(|e| frame.axis.with_effects(vec![e]).two_masses().ok().flatten());
-    terms_of(frame, &effects.iter().map(split).collect::<Vec<_>>())
+    terms_of(frame, resistance, &effects.iter().map(split).collect::<Vec<_>>())
 }
 
 /// The trace of what an axis is believed to have between motor and table; `None` where that is nothing.
-pub fn believed(frame: &Frame, axis: &Axis) -> Option<Trace> {
+pub fn believed(frame: &Frame, axis: &Axis, resistance: &Resistance) -> Option<Trace> {
     let masses = axis.two_masses().ok().flatten()?;
-    terms_of(frame, &[Some(masses)]).swap_remove(0).fixed
+    terms_of(frame, resistance, &[Some(masses)]).swap_remove(0).fixed
 }
 
 /// How a table swings behind a spring, as the law of an elastic drive has it: its own frequency, Hz, the share of the inertia, the
@@ -52,11 +57,11 @@ pub fn open_damping(frame: &Frame, effect: &Effect) -> f64 {
     0.5 * viscous / swing * faster
 }
 
-fn terms_of(frame: &Frame, splits: &[Option<TwoMasses>]) -> Vec<Term> {
+fn terms_of(frame: &Frame, resistance: &Resistance, splits: &[Option<TwoMasses>]) -> Vec<Term> {
     let sound: Vec<TwoMasses> = splits.iter().copied().flatten().collect();
     let together = |masses: &[TwoMasses]| match masses {
-        [one] => Tables::<1>::new(frame, std::slice::from_ref(one)).terms(1),
-        several => Tables::<LANES>::new(frame, several).terms(several.len()),
+        [one] => Tables::<1>::new(frame, resistance, std::slice::from_ref(one)).terms(1),
+        several => Tables::<LANES>::new(frame, resistance, several).terms(several.len()),
     };
     let mut found = sound.chunks(LANES).flat_map(together).collect::<Vec<_>>().into_iter();
     splits.iter().map(|split| split.and_then(|_| found.next()).unwrap_or_default()).collect()
@@ -67,6 +72,8 @@ fn terms_of(frame: &Frame, splits: &[Option<TwoMasses>]) -> Vec<Term> {
 const LANES: usize = 8;
 /// Radians of the fastest swing to a step: of a spring, whose swing is all that there is, and of flanks.
 const STEP_RAD: [f64; 2] = [0.12, 0.35];
+/// Radians of a table's swing on the bristles of its friction over which their torque may be taken from half way.
+const MOST_BRISTLE_RAD: f64 = 0.7;
 
 thread_local! {
     /// Torque and table − motor of every row and table, kept for the next simulation: handed back and asked for again each time, the
@@ -87,11 +94,11 @@ fn lanes<const N: usize>(value: impl Fn(usize) -> f64) -> [f64; N] {
 /// Tables behind one motor that moves as measured; motor's coordinate.
 struct Tables<'a, const N: usize> {
     frame: &'a Frame<'a>,
+    resistance: &'a Resistance,
     inertia: [f64; N],
     motor_inertia: [f64; N],
-    /// Share of friction, and its dry level.
+    /// Share of friction.
     share: [f64; N],
-    level: [f64; N],
     /// Half the clearance.
     half: [f64; N],
     /// The spring as the steps need it, and how much softer that is than the real one.
@@ -102,10 +109,11 @@ struct Tables<'a, const N: usize> {
     pieces: usize,
     steps: usize,
     step_s: f64,
-    /// What a step makes of a torque and of the speed there is, and what speed dry friction takes in it at most.
+    /// What a step makes of a torque and of the speed there is.
     mobility: [f64; N],
     kept: [f64; N],
-    dry: [f64; N],
+    /// How friction builds up on the tables' own way, of a table with all of it, where a step is short beside that way.
+    bristle: Option<Friction>,
     /// Whether there is a dead zone: flanks push and never pull.
     flanks: bool,
 }
@@ -134,8 +142,7 @@ impl Way {
 }
 
 impl<'a, const N: usize> Tables<'a, N> {
-    fn new(frame: &'a Frame<'a>, masses: &[TwoMasses]) -> Self {
-        let b = &frame.belief;
+    fn new(frame: &'a Frame<'a>, resistance: &'a Resistance, masses: &[TwoMasses]) -> Self {
         // Lanes without a table of their own repeat the last.
         let of = |value: fn(&TwoMasses) -> f64| lanes(|l| masses.get(l).or(masses.last()).map_or(1.0, value));
         let share = of(|m| m.table_friction_share);
@@ -146,18 +153,23 @@ impl<'a, const N: usize> Tables<'a, N> {
         let pieces = if flanks { 1.0 } else { (steps / MOST_STEPS).ceil() };
         let steps = pieces * (steps / pieces).ceil();
         let step_s = frame.columns.period_s / steps;
-        let (inertia, level) = (of(|m| m.table_inertia), share.map(|s| s * b.coulomb));
+        let inertia = of(|m| m.table_inertia);
         let mobility = inertia.map(|j| step_s / j);
         // In steps of h a spring swings at ω when it is softer by (sin(ωh/2)/(ωh/2))² (leapfrog integration).
         let swing = of(|m| (m.stiffness / m.table_inertia).sqrt()).map(|omega| (0.5 * step_s * omega).clamp(1e-9, 1.0));
         let softer = swing.map(|half| (half.sin() / half).powi(2));
         let stiffness = of(|m| m.stiffness);
+        // On a bristle that is stiffer than its steps can follow friction is there at once.
+        let lightest =
+            masses.iter().map(|m| m.table_inertia / m.table_friction_share.max(1e-9)).fold(f64::MAX, f64::min);
+        let piece_s = if flanks { step_s } else { frame.columns.period_s / pieces };
+        let swings_slower = |stiffness: f64| (stiffness / lightest).sqrt() * piece_s < MOST_BRISTLE_RAD;
         Self {
             frame,
+            resistance,
             inertia,
             motor_inertia: of(|m| m.motor_inertia),
             share,
-            level,
             half: of(|m| 0.5 * m.clearance),
             softer,
             stiffness: lanes(|l| stiffness[l] * softer[l]),
@@ -166,8 +178,11 @@ impl<'a, const N: usize> Tables<'a, N> {
             steps: steps as usize,
             step_s,
             mobility,
-            kept: lanes(|l| 1.0 - mobility[l] * share[l] * b.viscous),
-            dry: lanes(|l| mobility[l] * level[l]),
+            kept: lanes(|l| 1.0 - mobility[l] * share[l] * resistance.viscous),
+            bristle: resistance
+                .bristle
+                .filter(|(_, stiffness)| swings_slower(*stiffness))
+                .map(|(friction, _)| friction),
             flanks,
         }
     }
@@ -200,30 +215,51 @@ impl<'a, const N: usize> Tables<'a, N> {
         })
     }
 
+    /// What resists the motion of a rigid axis at a row, by a speed: friction of which the tables have their share, and load.
+    #[inline(always)]
+    fn resisting(&self, i: usize, speed: f64) -> (f64, f64) {
+        let r = self.resistance;
+        (r.dry[i] + r.viscous * speed * self.frame.unit + r.even[i], r.load[i])
+    }
+
+    /// Load of each table at a row, and largest dry friction of a table with all of it.
+    #[inline(always)]
+    fn load_and_level(&self, i: usize) -> ([f64; N], f64) {
+        let r = self.resistance;
+        (lanes(|l| r.load[i] + self.share[l] * r.even[i]), r.level[i])
+    }
+
     /// Torque that the link of a rigid axis carries at a row.
     #[inline(always)]
     fn carried(&self, i: usize) -> [f64; N] {
-        let (b, unit) = (&self.frame.belief, self.frame.unit);
-        let acceleration = self.frame.a[i] * unit;
-        let friction = b.coulomb * self.frame.direction[i] + b.viscous * self.frame.v[i] * unit;
-        lanes(|l| self.inertia[l] * acceleration + self.share[l] * friction + b.constant)
+        let acceleration = self.frame.a[i] * self.frame.unit;
+        let (friction, load) = self.resisting(i, self.frame.v[i]);
+        lanes(|l| self.inertia[l] * acceleration + self.share[l] * friction + load)
     }
 
     /// What the link of a rigid axis carries between a row and the next, shared between them by how near it acts: the
     /// triangular mean of the acceleration is a second difference, that of friction is taken as the base takes it.
     #[inline(always)]
     fn rigid(&self, i: usize) -> [[f64; N]; 2] {
-        let (b, unit, span) = (&self.frame.belief, self.frame.unit, self.frame.columns.period_s);
+        let (unit, span) = (self.frame.unit, self.frame.columns.period_s);
         let step = self.frame.columns.position[i + 1] - self.frame.columns.position[i];
         let speed = |i: usize| self.frame.raw_speed[i];
-        let friction = |i: usize| b.coulomb * self.frame.direction[i] + b.viscous * speed(i) * unit;
+        let ((here, load), (next, next_load)) = (self.resisting(i, speed(i)), self.resisting(i + 1, speed(i + 1)));
         let [side, middle] = [NUMEROV[0], 0.5 * NUMEROV[1]];
-        let share = |acceleration: f64, friction: f64| {
-            lanes(|l| self.inertia[l] * acceleration * unit + self.share[l] * friction + 0.5 * b.constant)
+        let share = |acceleration: f64, friction: f64, load: f64| {
+            lanes(|l| self.inertia[l] * acceleration * unit + self.share[l] * friction + load)
         };
         [
-            share((step - span * speed(i)) / (span * span), middle * friction(i) + side * friction(i + 1)),
-            share((span * speed(i + 1) - step) / (span * span), side * friction(i) + middle * friction(i + 1)),
+            share(
+                (step - span * speed(i)) / (span * span),
+                middle * here + side * next,
+                middle * load + side * next_load,
+            ),
+            share(
+                (span * speed(i + 1) - step) / (span * span),
+                side * here + middle * next,
+                side * load + middle * next_load,
+            ),
         ]
     }
 

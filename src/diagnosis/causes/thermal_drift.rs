@@ -13,7 +13,7 @@ pub static LAW: Law = Law {
         to_the_last.chain([vec![SLOWEST, 1.0]]).collect()
     },
     manner: PLAIN,
-    terms: |frame, shapes| {
+    terms: Terms::ByRows(|frame, shapes| {
         let dry = frame.judged(&frame.direction);
         each(shapes, |shape| {
             let (begin, per) = (frame.columns.time_s[0], 1.0 / (shape[0] * duration(frame)));
@@ -21,7 +21,7 @@ pub static LAW: Law = Law {
             let left = (-shape[1] / shape[0]).exp();
             Term::torque(fading.iter().zip(&dry).map(|(fading, dry)| (fading - left * dry) / (1.0 - left)).collect())
         })
-    },
+    }),
     effect: |frame, shape, c| {
         let [time_constant_s, until_s] = [*shape.first()?, *shape.get(1)?].map(|share| share * duration(frame));
         let drop = *c.first()?;

@@ -9,14 +9,14 @@ pub static LAW: Law = Law {
     scales: &[Scale::Log(0.1, 0.98)],
     starts: |_, _| (0..10).map(|i| vec![0.12 * 1.25f64.powi(i)]).collect(),
     manner: PLAIN,
-    terms: |frame, shapes| {
+    terms: Terms::ByRows(|frame, shapes| {
         each(shapes, |shape| {
             let limit = shape[0] * peak(frame);
             let beyond: Vec<f64> =
                 frame.columns.torque.iter().map(|t| t.signum() * (t.abs() - limit).max(0.0)).collect();
             Term::torque(frame.aligned(&beyond))
         })
-    },
+    }),
     effect: |frame, shape, c| {
         let slope_ratio = 1.0 - c.first()?;
         let sound = (-0.15..0.9).contains(&slope_ratio);

@@ -8,7 +8,7 @@ pub static LAW: Law = Law {
     scales: &[],
     starts: one_start,
     manner: PLAIN,
-    terms: |frame, shapes| each(shapes, |_| Term::torque(frame.speed.clone())),
+    terms: Terms::ByRows(|frame, shapes| each(shapes, |_| Term::torque(frame.speed.clone()))),
     effect: |frame, _, c| {
         let change = *c.first()?;
         let slope = frame.belief.viscous + change;

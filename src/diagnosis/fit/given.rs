@@ -8,7 +8,7 @@ impl Bench<'_, '_> {
     pub fn with_numbers(&self, fit: &Fit, shapes: &[Vec<f64>], coefficients: Vec<Vec<f64>>) -> Fit {
         let pairs = fit.parts.iter().zip(shapes);
         let moved = |(part, shape): (&Part, &Vec<f64>)| {
-            if *shape == part.shape { part.clone() } else { self.parts(part.law, vec![shape.clone()]).swap_remove(0) }
+            if *shape == part.shape { part.clone() } else { self.parts_like(part, vec![shape.clone()]).swap_remove(0) }
         };
         let mut own = self.fit(pairs.map(moved).collect());
         let given = coefficients.iter().flatten().zip(own.coefficients.iter().flatten());

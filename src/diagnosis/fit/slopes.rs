@@ -1,7 +1,8 @@
 //! How a model changes with the non-linear parameters of its parts, by central differences, each in the step of its scale.
 
-use super::{Bench, Fit, Part, projected};
+use super::{Bench, Fit, Part, add, projected};
 use crate::diagnosis::causes::Scale;
+use std::sync::Arc;
 
 /// The derivative of the model by one non-linear parameter.
 #[derive(Debug, Clone)]
@@ -31,10 +32,29 @@ impl Bench<'_, '_> {
         let parts = fit.parts.iter().enumerate().skip(first);
         parts
             .flat_map(|(i, part)| {
-                let slope = |side: &Side| self.slope(i, &fit.coefficients[i], side);
+                let table =
+                    fit.parts.iter().find(|table| table.law.is_simulated()).filter(|_| part.law.manner.turns_table);
+                let slope = |side: &Side| {
+                    let mut slope = self.slope(i, &fit.coefficients[i], side)?;
+                    let way =
+                        table.map(|table| [&side.up, &side.down].map(|part| self.table_beside(fit, i, part, table)));
+                    if let Some([Some(up), Some(down)]) = way {
+                        add(&mut slope.column, 1.0 / side.apart, &up);
+                        add(&mut slope.column, -1.0 / side.apart, &down);
+                    }
+                    Some(slope)
+                };
                 self.both_sides(part).iter().filter_map(slope).collect::<Vec<_>>()
             })
             .collect()
+    }
+
+    /// The trace of a simulated table with another in place of part `i`.
+    fn table_beside(&self, fit: &Fit, i: usize, part: &Part, table: &Part) -> Option<Arc<[f64]>> {
+        let mut parts = fit.parts.clone();
+        parts[i] = part.clone();
+        let resistance = self.resistance_by(&parts, &fit.coefficients);
+        self.parts_under(table.law, vec![table.shape.clone()], &resistance).swap_remove(0).fixed
     }
 
     /// The step of each non-linear parameter that takes most off the squares. What the rows do not tell stays where it is: they
@@ -98,7 +118,7 @@ impl Bench<'_, '_> {
             }
             moves.push((index, scale.distance(below, above)));
         }
-        let mut parts = self.parts(part.law, shapes).into_iter();
+        let mut parts = self.parts_like(part, shapes).into_iter();
         let side = |(index, apart): (usize, f64)| Some(Side { index, apart, up: parts.next()?, down: parts.next()? });
         moves.into_iter().map_while(side).collect()
     }

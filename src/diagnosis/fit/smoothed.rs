@@ -38,7 +38,8 @@ impl Bench<'_, '_> {
         let sum = |column: &[f64]| summed(column.to_vec(), kept.len(), &windows);
         let (measured, doubt) = (sum(&self.measured), sum(&self.doubt));
         let free = orthonormalised(self.free.iter().map(|column| unit(sum(column))).collect());
-        Self { measured, doubt, certain: self.certain.clone(), free, rows: windows.len(), windows, ..*self }
+        let (certain, resistance) = (self.certain.clone(), self.resistance.clone());
+        Self { measured, doubt, certain, free, resistance, rows: windows.len(), windows, ..*self }
     }
 
     /// A set of causes fitted on other equations of the same rows, on these.
@@ -86,7 +87,7 @@ impl Bench<'_, '_> {
                 }
                 shape
             };
-            let tried = self.parts(part.law, SHARES.iter().map(along).collect());
+            let tried = self.parts_like(&part, SHARES.iter().map(along).collect());
             let tried = sides.into_iter().flat_map(|side| [side.up, side.down]).chain(tried);
             let tried = tried
                 .map(|part| (self.left_beside(set, &part), part))

@@ -18,6 +18,8 @@ struct State<const N: usize> {
     side: [f64; N],
     /// How the motor has given way.
     given: [[f64; N]; 3],
+    /// How friction has built up on the way of each, where it does.
+    bristles: Option<[Friction; N]>,
     /// Not known to move with the motor.
     loose: [bool; N],
 }
@@ -30,8 +32,6 @@ impl<const N: usize> Tables<'_, N> {
         let settled = (SWING_S / self.frame.columns.period_s).ceil() as usize;
         // Where the table of a rigid link is at a load.
         let behind = |l: usize, motor: f64, load: f64| motor - self.half[l].copysign(load) - load / self.stiffness[l];
-        // Near no load the flanks may part within the row.
-        let least = self.level.map(|level| 0.1 * level);
         let mut load = self.carried(rows.start);
         let mut state = State {
             position: [0.0; N],
@@ -39,8 +39,11 @@ impl<const N: usize> Tables<'_, N> {
             together: [0; N],
             side: [0.0; N],
             given: [[0.0; N]; 3],
+            bristles: self.bristle.map(|at_rest| [at_rest; N]),
             loose: [false; N],
         };
+        // Where a table moves with the motor its friction has built up as the motor's way has it.
+        let mut with_motor = self.bristle;
         let mut any = false;
         extra[rows.start] = [0.0; N];
         if let Some(last) = lag.get_mut(rows.end - 1) {
@@ -51,11 +54,16 @@ impl<const N: usize> Tables<'_, N> {
             let next = self.carried(i + 1);
             let motor = self.frame.columns.position[i] * unit;
             let steady = i > rows.start && self.frame.direction[i] * self.frame.direction[i + 1] > 0.5;
+            let level = self.resistance.level[i];
+            if let Some(friction) = with_motor.as_mut().filter(|_| i > rows.start) {
+                friction.moved((self.frame.columns.position[i] - self.frame.columns.position[i - 1]) * unit, level);
+            }
             let mut firm = [false; N];
             let mut all_firm = steady;
             for l in 0..N {
                 let both = smaller(load[l].abs(), next[l].abs());
-                firm[l] = steady & (both > least[l]) & (load[l] * next[l] > 0.0);
+                // Near no load the flanks may part within the row.
+                firm[l] = steady & (both > 0.1 * self.share[l] * level) & (load[l] * next[l] > 0.0);
                 all_firm &= firm[l];
             }
             // In most rows of most tables this is all.
@@ -75,6 +83,9 @@ impl<const N: usize> Tables<'_, N> {
                     state.speed[l] = self.frame.raw_speed[i] * unit;
                     state.together[l] = 0;
                     (state.given[0][l], state.given[1][l], state.given[2][l]) = (0.0, 0.0, load[l]);
+                    if let (Some(bristles), Some(friction)) = (&mut state.bristles, with_motor) {
+                        bristles[l] = friction;
+                    }
                 }
                 state.loose[l] = !(firm && held);
                 any |= state.loose[l];
@@ -83,7 +94,7 @@ impl<const N: usize> Tables<'_, N> {
                 *lag = lanes(|l| (state.position[l] - motor) / unit);
             }
             if any {
-                let [near, far] = self.between(&self.way(i), giving, &mut state);
+                let [near, far] = self.between(i, giving, &mut state);
                 let rigid = self.rigid(i);
                 for l in (0..N).filter(|l| state.loose[*l]) {
                     extra[i][l] += near[l] - rigid[0][l];
@@ -97,12 +108,14 @@ impl<const N: usize> Tables<'_, N> {
     /// Moves the tables on by one row; answers the share of each link's torque that belongs to the row and to the next one, by
     /// how near it acts.
     #[inline(always)]
-    fn between(&self, way: &Way, yielding: Giving, state: &mut State<N>) -> [[f64; N]; 2] {
+    fn between(&self, row: usize, yielding: Giving, state: &mut State<N>) -> [[f64; N]; 2] {
+        let (way, (load, level)) = (self.way(row), self.load_and_level(row));
         let (per_step, per_span) = (1.0 / self.steps as f64, 1.0 / self.frame.columns.period_s);
         let half_step = 0.5 * self.step_s;
         let motor_mobility = self.motor_inertia.map(|j| self.step_s / j);
         // Each step waits for the one before it: what does not depend on that is worked out beside it, not within.
-        let pull = self.mobility.map(|m| m * self.frame.belief.constant);
+        let pull: [f64; N] = lanes(|l| self.mobility[l] * load[l]);
+        let dry: [f64; N] = lanes(|l| self.mobility[l] * self.share[l] * level);
         let slack = lanes::<N>(|l| self.stiffness[l] * self.half[l]);
         let mut v = state.speed;
         let mut middle: [f64; N] = lanes(|l| state.position[l] + half_step * v[l]);
@@ -123,9 +136,14 @@ impl<const N: usize> Tables<'_, N> {
                     yielding.step([give[l], giving[l], answered[l]], push, motor_mobility[l]);
                 sum[l] += push;
                 far[l] += s * push;
-                // Dry friction takes what speed it can, and never turns it.
                 let free = (self.kept[l] * v[l] - pull[l]) + self.mobility[l] * push;
-                v[l] = free - larger(smaller(free, self.dry[l]), -self.dry[l]);
+                v[l] = match &mut state.bristles {
+                    Some(bristles) => {
+                        free - self.mobility[l] * self.share[l] * bristles[l].moved(self.step_s * v[l], level)
+                    }
+                    // Dry friction takes what speed it can, and never turns it.
+                    None => free - larger(smaller(free, dry[l]), -dry[l]),
+                };
                 middle[l] += self.step_s * v[l];
             }
         }

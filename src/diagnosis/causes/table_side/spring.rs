@@ -1,6 +1,7 @@
 //! Tables behind springs. While a table slides one way all is linear: what the steps between two rows make of position, speed,
-//! the motor's way and friction is worked out once, and a row is a few products instead of many steps. Where a table may turn
-//! or stick within the row, the steps are made.
+//! the motor's way, load and friction is worked out once, and a row is a few products instead of many steps. Where a table may
+//! turn or stick within the row, the steps are made. Friction that builds up over a way neither turns nor sticks within a row: it is
+//! taken from half of the way that the table is about to go.
 
 use super::*;
 
@@ -21,25 +22,24 @@ struct Moved<const N: usize> {
     far: [f64; N],
 }
 
-/// What one number of [`Moved`] is by the constant torque, and by one unit of all else.
+/// What one number of [`Moved`] is by one unit of all that makes it.
 struct Made<const N: usize> {
-    constant: [f64; N],
     position: [f64; N],
     speed: [f64; N],
     rate: [f64; N],
     bend: [f64; N],
     twist: [f64; N],
-    /// Friction against sliding forward.
-    friction: [f64; N],
+    /// Torque against moving forward.
+    resisting: [f64; N],
 }
 
 impl<const N: usize> Made<N> {
     #[inline(always)]
-    fn of(&self, way: &Way, x: &[f64; N], v: &[f64; N], side: &[f64; N]) -> [f64; N] {
+    fn of(&self, way: &Way, x: &[f64; N], v: &[f64; N], resisting: &[f64; N]) -> [f64; N] {
         lanes(|l| {
             let motor = self.rate[l] * way.rate + self.bend[l] * way.bend + self.twist[l] * way.twist;
             let table = self.position[l] * x[l] + self.speed[l] * v[l];
-            (self.constant[l] + motor) + (table + self.friction[l] * side[l])
+            motor + (table + self.resisting[l] * resisting[l])
         })
     }
 }
@@ -62,23 +62,19 @@ impl<const N: usize> Tables<'_, N> {
         let steps = self.steps / self.pieces;
         const REST: Way = Way { at: 0.0, rate: 0.0, bend: 0.0, twist: 0.0 };
         let (none, one) = ([0.0; N], [1.0; N]);
-        let by = |way, position, speed, constant, friction: f64| {
-            self.stepped(&way, position, speed, steps, constant, |l, _| friction * self.dry[l])
-        };
-        let constant = by(REST, none, none, self.frame.belief.constant, 0.0);
-        let (position, speed) = (by(REST, one, none, 0.0, 0.0), by(REST, none, one, 0.0, 0.0));
-        let rate = by(Way { rate: 1.0, ..REST }, none, none, 0.0, 0.0);
-        let bend = by(Way { bend: 1.0, ..REST }, none, none, 0.0, 0.0);
-        let twist = by(Way { twist: 1.0, ..REST }, none, none, 0.0, 0.0);
-        let friction = by(REST, none, none, 0.0, 1.0);
+        let by = |way, position, speed, load| self.stepped(&way, position, speed, steps, load, |_, _| 0.0);
+        let (position, speed) = (by(REST, one, none, none), by(REST, none, one, none));
+        let rate = by(Way { rate: 1.0, ..REST }, none, none, none);
+        let bend = by(Way { bend: 1.0, ..REST }, none, none, none);
+        let twist = by(Way { twist: 1.0, ..REST }, none, none, none);
+        let resisting = by(REST, none, none, one);
         let made = |of: fn(&Moved<N>) -> [f64; N]| Made {
-            constant: of(&constant),
             position: of(&position),
             speed: of(&speed),
             rate: of(&rate),
             bend: of(&bend),
             twist: of(&twist),
-            friction: of(&friction),
+            resisting: of(&resisting),
         };
         Sliding {
             steps,
@@ -107,6 +103,7 @@ impl<const N: usize> Tables<'_, N> {
             x[l] = -x[l] / self.stiffness[l];
         }
         let mut v = [self.frame.raw_speed[rows.start] * unit; N];
+        let mut bristles = self.bristle.map(|at_rest| [at_rest; N]);
         extra[rows.start] = [0.0; N];
         if let Some(last) = lag.get_mut(rows.end - 1) {
             *last = [0.0; N];
@@ -117,14 +114,25 @@ impl<const N: usize> Tables<'_, N> {
                 *lag = lanes(|l| self.softer[l] * x[l] / unit);
             }
             let mut way = self.way(i);
+            let (load, level) = self.load_and_level(i);
             let (mut sum, mut far) = ([0.0; N], [0.0; N]);
             for piece in 0..self.pieces {
-                let moved = match sliding.moved(&way, &x, &v) {
-                    Some(moved) => moved,
+                let moved = match &mut bristles {
+                    Some(bristles) => {
+                        let half_way = 0.5 * sliding.share * self.frame.columns.period_s;
+                        let rub: [f64; N] = lanes(|l| self.share[l] * { bristles[l] }.moved(half_way * v[l], level));
+                        let moved = sliding.moved_against(&way, &x, &v, &lanes(|l| load[l] + rub[l]));
+                        for l in 0..N {
+                            bristles[l].moved(moved.position[l] - x[l], level);
+                        }
+                        moved
+                    }
                     None => {
-                        let rub = |l: usize, free: f64| larger(smaller(free, self.dry[l]), -self.dry[l]);
-                        let way = Way { at: 0.0, ..way };
-                        self.stepped(&way, x, v, sliding.steps, self.frame.belief.constant, rub)
+                        sliding.moved(&way, &x, &v, &load, &lanes(|l| self.share[l] * level)).unwrap_or_else(|| {
+                            let most = lanes::<N>(|l| self.mobility[l] * self.share[l] * level);
+                            let rub = |l: usize, free: f64| larger(smaller(free, most[l]), -most[l]);
+                            self.stepped(&Way { at: 0.0, ..way }, x, v, sliding.steps, load, rub)
+                        })
                     }
                 };
                 let next = way.from(sliding.share);
@@ -153,7 +161,7 @@ impl<const N: usize> Tables<'_, N> {
         mut x: [f64; N],
         mut v: [f64; N],
         steps: usize,
-        constant: f64,
+        load: [f64; N],
         rub: impl Fn(usize, f64) -> f64,
     ) -> Moved<N> {
         let (per_step, per_span) = (1.0 / self.steps as f64, 1.0 / self.frame.columns.period_s);
@@ -168,7 +176,7 @@ impl<const N: usize> Tables<'_, N> {
                 sum[l] += push;
                 far[l] += s * push;
                 // Dry friction takes what speed it can, and never turns it.
-                let free = self.kept[l] * v[l] + self.mobility[l] * (push - constant);
+                let free = self.kept[l] * v[l] + self.mobility[l] * (push - load[l]);
                 v[l] = free - rub(l, free);
                 x[l] = middle + half_step * v[l];
             }
@@ -181,11 +189,13 @@ impl<const N: usize> Tables<'_, N> {
 }
 
 impl<const N: usize> Sliding<N> {
-    /// Tables at a place and speed moved on by a piece of the motor's way; `None` where one may not slide one way all along.
+    /// Tables at a place and speed moved on by a piece of the motor's way, under a load and so much dry friction; `None` where one may
+    /// not slide one way all along.
     #[inline(always)]
-    fn moved(&self, way: &Way, x: &[f64; N], v: &[f64; N]) -> Option<Moved<N>> {
-        let side = lanes(|l| 1.0f64.copysign(v[l]));
-        let (half_way, speed) = (self.half_way.of(way, x, v, &side), self.speed.of(way, x, v, &side));
+    fn moved(&self, way: &Way, x: &[f64; N], v: &[f64; N], load: &[f64; N], friction: &[f64; N]) -> Option<Moved<N>> {
+        let side: [f64; N] = lanes(|l| 1.0f64.copysign(v[l]));
+        let resisting = lanes(|l| load[l] + friction[l] * side[l]);
+        let (half_way, speed) = (self.half_way.of(way, x, v, &resisting), self.speed.of(way, x, v, &resisting));
         // By how much it slides on at least.
         let mut least = f64::INFINITY;
         for l in 0..N {
@@ -196,8 +206,21 @@ impl<const N: usize> Sliding<N> {
         if !(least > 0.0) {
             return None;
         }
-        let (position, sum) = (self.position.of(way, x, v, &side), self.sum.of(way, x, v, &side));
-        Some(Moved { position, speed, half_way, sum, far: self.far.of(way, x, v, &side) })
+        let (position, sum) = (self.position.of(way, x, v, &resisting), self.sum.of(way, x, v, &resisting));
+        Some(Moved { position, speed, half_way, sum, far: self.far.of(way, x, v, &resisting) })
+    }
+
+    /// The same against a torque that is known.
+    #[inline(always)]
+    fn moved_against(&self, way: &Way, x: &[f64; N], v: &[f64; N], resisting: &[f64; N]) -> Moved<N> {
+        let of = |made: &Made<N>| made.of(way, x, v, resisting);
+        Moved {
+            position: of(&self.position),
+            speed: of(&self.speed),
+            half_way: of(&self.half_way),
+            sum: of(&self.sum),
+            far: of(&self.far),
+        }
     }
 }
 

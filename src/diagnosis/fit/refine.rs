@@ -1,0 +1,124 @@
+//! Refining: non-linear parameters go by Gauss–Newton with step halving on what the coefficients leave (variable projection, Golub
+//! and Pereyra 1973).
+//!
+//! A table behind a spring or a clearance moves under all the friction and load that a set of causes has, so that its trace goes
+//! with the numbers of the others. It is simulated anew wherever those have moved: a fit and its table are at one.
+
+use super::{Bench, Fit, Part};
+use crate::diagnosis::causes::Resistance;
+use crate::diagnosis::progress::{Stopped, Watch};
+use crate::machine::{Cause, Effect};
+use std::sync::Arc;
+
+impl Bench<'_, '_> {
+    /// Refines the non-linear parameters of the parts from index `first` on, until a step brings nothing.
+    #[must_use]
+    pub fn refine(&self, fit: Fit, first: usize, most: usize) -> Fit {
+        self.refine_while(fit, first, most, 1e-5, |_| ())
+    }
+
+    /// The same of a set with nothing else to do beside it: on all cores at hand.
+    ///
+    /// # Errors
+    /// [`Stopped`] when the watch's caller said so.
+    pub fn refine_across(&self, fit: Fit, most: usize, watch: &Watch) -> Result<Fit, Stopped> {
+        let look_about = |fit: &Fit| {
+            let look = |part: &Part| _ = self.both_sides(part);
+            // Who says stop is heard after the fit.
+            _ = watch.each(&fit.parts, (0.8, 0.8), "fitting causes", look);
+        };
+        let fit = self.refine_while(fit, 0, most, 1e-5, look_about);
+        watch.at(0.8, "fitting causes").map(|()| fit)
+    }
+
+    /// The same until a step takes less than a thousandth off the squares: enough to compare sets of causes.
+    #[must_use]
+    pub fn refine_roughly(&self, fit: Fit, first: usize, most: usize) -> Fit {
+        self.refine_while(fit, first, most, 1e-3, |_| ())
+    }
+
+    fn refine_while(&self, fit: Fit, first: usize, most: usize, least: f64, look_about: impl Fn(&Fit)) -> Fit {
+        let mut fit = self.at_one(fit);
+        for _ in 0..most {
+            look_about(&fit);
+            let slopes = self.slopes(&fit, first);
+            if slopes.is_empty() {
+                break;
+            }
+            let steps = self.steps(&fit, &slopes);
+            let before = fit.squares();
+            let mut share = 1.0;
+            let mut better = None;
+            for _ in 0..4 {
+                let mut parts = fit.parts.clone();
+                let mut moved: Vec<usize> = Vec::new();
+                for (slope, step) in slopes.iter().zip(&steps) {
+                    let part = &mut parts[slope.part];
+                    let scale = part.law.scales[slope.index];
+                    part.shape[slope.index] = scale.moved(part.shape[slope.index], share * step);
+                    moved.push(slope.part);
+                }
+                moved.dedup();
+                let resistance = self.resistance_by(&parts, &fit.coefficients);
+                for (i, part) in parts.iter_mut().enumerate() {
+                    if moved.contains(&i) || moves_otherwise(part, &resistance) {
+                        *part = self.parts_under(part.law, vec![part.shape.clone()], &resistance).swap_remove(0);
+                    }
+                }
+                let next = self.fit(parts);
+                if next.squares() < before {
+                    better = Some(next);
+                    break;
+                }
+                share *= 0.3;
+            }
+            let Some(next) = better else { break };
+            let gained = 1.0 - next.squares() / before;
+            fit = self.at_one(next);
+            if gained < least {
+                break;
+            }
+        }
+        fit
+    }
+
+    /// What resists the table of a fit, by the belief and its causes.
+    #[must_use]
+    pub fn resistance_of(&self, fit: &Fit) -> Arc<Resistance> {
+        self.resistance_by(&fit.parts, &fit.coefficients)
+    }
+
+    /// The same by parts and coefficients.
+    pub(super) fn resistance_by(&self, parts: &[Part], coefficients: &[Vec<f64>]) -> Arc<Resistance> {
+        // All of the friction builds up, however much of that a wrong table has taken on itself.
+        let all = [self.frame.belief.coulomb, 0.0];
+        let effect = |(part, c): (&Part, &Vec<f64>)| {
+            let c = if part.law.cause == Cause::PreslidingFriction { &all[..] } else { c };
+            (part.law.effect)(self.frame, &part.shape, c)
+        };
+        let effects = parts.iter().zip(coefficients).filter(|(part, _)| !part.law.is_simulated()).filter_map(effect);
+        let found: Vec<Effect> = effects.filter(Resistance::has).collect();
+        if found.is_empty() { self.resistance.clone() } else { Arc::new(self.resistance.with(self.frame, found)) }
+    }
+
+    /// A fit whose table, where one is simulated, moves under what its other causes make of friction and load.
+    #[must_use]
+    pub fn at_one(&self, fit: Fit) -> Fit {
+        if !fit.parts.iter().any(|part| part.law.is_simulated()) {
+            return fit;
+        }
+        let resistance = self.resistance_of(&fit);
+        let Some(at) = fit.parts.iter().position(|part| moves_otherwise(part, &resistance)) else { return fit };
+        let Part { law, shape, .. } = &fit.parts[at];
+        let own = self.parts_under(law, vec![shape.clone()], &resistance);
+        let mut parts = fit.parts;
+        parts.splice(at..=at, own);
+        self.fit(parts)
+    }
+}
+
+/// Whether a table was simulated that moves otherwise under this.
+fn moves_otherwise(part: &Part, resistance: &Arc<Resistance>) -> bool {
+    let same = || Arc::ptr_eq(&part.resistance, resistance) || part.resistance.is_like(resistance);
+    part.law.is_simulated() && !same()
+}
