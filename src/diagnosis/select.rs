@@ -148,6 +148,15 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
         if best.last().is_some_and(|fit| !is_more(price(fit), first)) {
             break;
         }
+        // A cause that takes no more off than going to the bottom with those that are there would only stand in for that.
+        if let Some(last) = best.last_mut().filter(|last| !first.halves(last)) {
+            let bottom = at_the_bottom(search, last)?;
+            if price(&bottom) <= price(first) {
+                *last = bottom;
+                beam = vec![last.clone()];
+                continue;
+            }
+        }
         let of_fewer = best.last().map_or(f64::INFINITY, price);
         best.push(first.clone());
         rivals = grown.iter().skip(1).take(4).cloned().collect();
@@ -166,6 +175,16 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     let plain = Selection { fit, rivals, alike: Vec::new() };
     let found = formulation::settled(search.bench, plain, search.watch)?;
     grown_on(search, found)
+}
+
+/// A set with a simulated table, which the search refines but roughly, as far down as it goes.
+fn at_the_bottom(search: &Search, fit: &Fit) -> Result<Fit, Stopped> {
+    if !fit.parts.iter().any(|part| part.law.is_simulated()) {
+        return Ok(fit.clone());
+    }
+    let refined = search.bench.refine_across(fit.clone(), 8, search.watch)?;
+    let refined = valleys::settled(search.bench, search.laws, refined, search.watch)?;
+    Ok(if is_physical(search.bench, &refined) { refined } else { fit.clone() })
 }
 
 /// A selection with what is needed beside friction of another formulation than the search knows: what stood in for that

@@ -20,7 +20,7 @@ pub static LAW: Law = Law {
         // A width that is a fifth off meets the flanks at the wrong time and explains little.
         let least = (3.0 * frame.grid).max(2e-3) * 1e3;
         let widths = log_spaced(least, (10.0 * least).max(300.0), 12);
-        widths.flat_map(|width| of_width(width)).collect()
+        widths.flat_map(of_width).collect()
     },
     manner: Manner {
         approached: true,
