@@ -24,7 +24,7 @@ const BEAM: usize = 2;
 /// Causes refined for each set that grows.
 const TRIED: usize = 6;
 /// Of the starts of a law that turns a table round in another way, which is simulated anew for each, one in so many is tried.
-const EVERY: usize = 2;
+const EVERY: usize = 3;
 /// Most causes in a set.
 const MOST: usize = 6;
 /// Starts of a law that are laid out in one go; springs are stepped as many side by side.
@@ -296,7 +296,10 @@ fn with_one_more(
 ) -> Result<Vec<Fit>, Stopped> {
     let Search { bench, watch, .. } = search;
     let half = 0.5 * (from + to);
-    let look = |&(set, law): &(_, _)| at_best_starts(search, set, law);
+    // Where the best set leaves little no other can come before it by much, and tables need not be turned round for it.
+    let sets = open.iter().map(|(set, _)| *set).min_by(|a, b| price(a).total_cmp(&price(b)));
+    let much_left = sets.is_some_and(|best| Excess::of(bench, best, best).largest() > LITTLE_LEFT);
+    let look = |&(set, law): &(_, _)| at_best_starts(search, set, law, much_left);
     let mut children: Vec<Child> =
         watch.each(open, (from, half), "looking for causes", look)?.into_iter().flatten().collect();
     children.sort_by(|a, b| a.price.total_cmp(&b.price));
@@ -355,7 +358,8 @@ pub fn refined(bench: &Bench, set: &Fit, part: Part) -> Fit {
 }
 
 /// A law where it explains most of what a set leaves, if that is worth refining; a ripple of few periods beside a fine one.
-fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Vec<Child<'s>> {
+/// `much_left` says whether the best of the sets leaves much.
+fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law, much_left: bool) -> Vec<Child<'s>> {
     let Search { bench, approach, shelf, .. } = search;
     let shelved = || shelf.get(&law.cause).map_or(&[][..], Vec::as_slice);
     let fresh: Vec<Part>;
@@ -380,7 +384,7 @@ fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Vec<C
         let alike = parts.iter().filter(|part| few_periods(part) == few);
         let mut start = alike.map(|part| (figure_with(part), part)).min_by(|a, b| a.0.total_cmp(&b.0))?;
         let least = set.figure() - if few { LEAST_OF_FEW } else { LEAST_AT_START };
-        if beside_table && law.manner.turns_table {
+        if beside_table && law.manner.turns_table && much_left {
             let all = parts.iter().step_by(EVERY).map(|part| (at_one(part), part));
             start = all.chain([start]).min_by(|a, b| a.0.total_cmp(&b.0))?;
         } else if beside_table && start.0 < least {

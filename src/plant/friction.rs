@@ -134,6 +134,16 @@ impl Friction {
         bristle.force
     }
 
+    /// The torque that [`Friction::moved`] would give, with the bristle left where it is.
+    #[must_use]
+    #[inline]
+    pub fn after(&self, dq: f64, level: f64) -> f64 {
+        match self.elements {
+            None => Self { elements: None, bristle: self.bristle }.moved(dq, level),
+            Some(_) => { *self }.moved(dq, level),
+        }
+    }
+
     /// What its damping adds at speed `w`.
     #[must_use]
     pub fn damped(&mut self, w: f64, level: f64) -> f64 {

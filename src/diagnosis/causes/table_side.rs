@@ -118,6 +118,13 @@ struct Tables<'a, const N: usize> {
     flanks: bool,
 }
 
+/// What resists tables at a row: the load of each and its largest dry friction, and that of a table with all of it.
+struct Resisting<const N: usize> {
+    load: [f64; N],
+    friction: [f64; N],
+    level: f64,
+}
+
 /// The way of the motor from a row to the next: value and derivatives of the cubic by shares of the time between them.
 #[derive(Clone, Copy)]
 struct Way {
@@ -222,11 +229,11 @@ impl<'a, const N: usize> Tables<'a, N> {
         (r.dry[i] + r.viscous * speed * self.frame.unit + r.even[i], r.load[i])
     }
 
-    /// Load of each table at a row, and largest dry friction of a table with all of it.
+    /// What resists the tables at a row.
     #[inline(always)]
-    fn load_and_level(&self, i: usize) -> ([f64; N], f64) {
-        let r = self.resistance;
-        (lanes(|l| r.load[i] + self.share[l] * r.even[i]), r.level[i])
+    fn resisting_tables(&self, i: usize) -> Resisting<N> {
+        let (even, load, level) = (self.resistance.even[i], self.resistance.load[i], self.resistance.level[i]);
+        Resisting { load: lanes(|l| load + self.share[l] * even), friction: lanes(|l| self.share[l] * level), level }
     }
 
     /// Torque that the link of a rigid axis carries at a row.

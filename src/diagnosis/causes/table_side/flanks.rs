@@ -109,13 +109,38 @@ impl<const N: usize> Tables<'_, N> {
     /// how near it acts.
     #[inline(always)]
     fn between(&self, row: usize, yielding: Giving, state: &mut State<N>) -> [[f64; N]; 2] {
-        let (way, (load, level)) = (self.way(row), self.load_and_level(row));
+        let resisting = self.resisting_tables(row);
+        let dry: [f64; N] = lanes(|l| self.mobility[l] * resisting.friction[l]);
+        let mut bristles = state.bristles.take();
+        let shared = match &mut bristles {
+            // Dry friction takes what speed it can, and never turns it.
+            None => {
+                self.stepping(row, yielding, state, &resisting, |l, free, _| larger(smaller(free, dry[l]), -dry[l]))
+            }
+            Some(bristles) => self.stepping(row, yielding, state, &resisting, |l, _, v| {
+                self.mobility[l] * self.share[l] * bristles[l].moved(self.step_s * v, resisting.level)
+            }),
+        };
+        state.bristles = bristles;
+        shared
+    }
+
+    /// The same by what `rub` takes off the speed that a table would have, from the one that it had.
+    #[inline(always)]
+    fn stepping(
+        &self,
+        row: usize,
+        yielding: Giving,
+        state: &mut State<N>,
+        resisting: &Resisting<N>,
+        mut rub: impl FnMut(usize, f64, f64) -> f64,
+    ) -> [[f64; N]; 2] {
+        let way = self.way(row);
         let (per_step, per_span) = (1.0 / self.steps as f64, 1.0 / self.frame.columns.period_s);
         let half_step = 0.5 * self.step_s;
         let motor_mobility = self.motor_inertia.map(|j| self.step_s / j);
         // Each step waits for the one before it: what does not depend on that is worked out beside it, not within.
-        let pull: [f64; N] = lanes(|l| self.mobility[l] * load[l]);
-        let dry: [f64; N] = lanes(|l| self.mobility[l] * self.share[l] * level);
+        let pull: [f64; N] = lanes(|l| self.mobility[l] * resisting.load[l]);
         let slack = lanes::<N>(|l| self.stiffness[l] * self.half[l]);
         let mut v = state.speed;
         let mut middle: [f64; N] = lanes(|l| state.position[l] + half_step * v[l]);
@@ -137,13 +162,7 @@ impl<const N: usize> Tables<'_, N> {
                 sum[l] += push;
                 far[l] += s * push;
                 let free = (self.kept[l] * v[l] - pull[l]) + self.mobility[l] * push;
-                v[l] = match &mut state.bristles {
-                    Some(bristles) => {
-                        free - self.mobility[l] * self.share[l] * bristles[l].moved(self.step_s * v[l], level)
-                    }
-                    // Dry friction takes what speed it can, and never turns it.
-                    None => free - larger(smaller(free, dry[l]), -dry[l]),
-                };
+                v[l] = free - rub(l, free, v[l]);
                 middle[l] += self.step_s * v[l];
             }
         }

@@ -95,6 +95,40 @@ impl<const N: usize> Tables<'_, N> {
         extra: &mut [[f64; N]],
         lag: &mut [[f64; N]],
     ) {
+        match self.bristle {
+            None => self.moving(sliding, rows, extra, lag, |way, x, v, at| {
+                let slid = sliding.moved(way, x, v, &at.load, &at.friction);
+                slid.unwrap_or_else(|| {
+                    let most: [f64; N] = lanes(|l| self.mobility[l] * at.friction[l]);
+                    let rub = |l: usize, free: f64| larger(smaller(free, most[l]), -most[l]);
+                    self.stepped(&Way { at: 0.0, ..*way }, *x, *v, sliding.steps, at.load, rub)
+                })
+            }),
+            Some(at_rest) => {
+                let mut bristles = [at_rest; N];
+                let half = 0.5 * sliding.share * self.frame.columns.period_s;
+                self.moving(sliding, rows, extra, lag, |way, x, v, at| {
+                    let rub = |l: usize| self.share[l] * bristles[l].after(half * v[l], at.level);
+                    let moved = sliding.moved_against(way, x, v, &lanes(|l| at.load[l] + rub(l)));
+                    for l in 0..N {
+                        bristles[l].moved(moved.position[l] - x[l], at.level);
+                    }
+                    moved
+                });
+            }
+        }
+    }
+
+    /// Moves tables along the rows, over each piece of the motor's way by what `go` makes of it.
+    #[inline(always)]
+    fn moving(
+        &self,
+        sliding: &Sliding<N>,
+        rows: Range<usize>,
+        extra: &mut [[f64; N]],
+        lag: &mut [[f64; N]],
+        mut go: impl FnMut(&Way, &[f64; N], &[f64; N], &Resisting<N>) -> Moved<N>,
+    ) {
         let unit = self.frame.unit;
         let per_step = 1.0 / self.steps as f64;
         // Seen from the motor.
@@ -103,7 +137,6 @@ impl<const N: usize> Tables<'_, N> {
             x[l] = -x[l] / self.stiffness[l];
         }
         let mut v = [self.frame.raw_speed[rows.start] * unit; N];
-        let mut bristles = self.bristle.map(|at_rest| [at_rest; N]);
         extra[rows.start] = [0.0; N];
         if let Some(last) = lag.get_mut(rows.end - 1) {
             *last = [0.0; N];
@@ -114,27 +147,10 @@ impl<const N: usize> Tables<'_, N> {
                 *lag = lanes(|l| self.softer[l] * x[l] / unit);
             }
             let mut way = self.way(i);
-            let (load, level) = self.load_and_level(i);
+            let resisting = self.resisting_tables(i);
             let (mut sum, mut far) = ([0.0; N], [0.0; N]);
             for piece in 0..self.pieces {
-                let moved = match &mut bristles {
-                    Some(bristles) => {
-                        let half_way = 0.5 * sliding.share * self.frame.columns.period_s;
-                        let rub: [f64; N] = lanes(|l| self.share[l] * { bristles[l] }.moved(half_way * v[l], level));
-                        let moved = sliding.moved_against(&way, &x, &v, &lanes(|l| load[l] + rub[l]));
-                        for l in 0..N {
-                            bristles[l].moved(moved.position[l] - x[l], level);
-                        }
-                        moved
-                    }
-                    None => {
-                        sliding.moved(&way, &x, &v, &load, &lanes(|l| self.share[l] * level)).unwrap_or_else(|| {
-                            let most = lanes::<N>(|l| self.mobility[l] * self.share[l] * level);
-                            let rub = |l: usize, free: f64| larger(smaller(free, most[l]), -most[l]);
-                            self.stepped(&Way { at: 0.0, ..way }, x, v, sliding.steps, load, rub)
-                        })
-                    }
-                };
+                let moved = go(&way, &x, &v, &resisting);
                 let next = way.from(sliding.share);
                 let before = piece as f64 * sliding.share;
                 for l in 0..N {
