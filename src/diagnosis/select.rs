@@ -260,6 +260,10 @@ impl Child<'_> {
 fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit>, Stopped> {
     let Search { bench, laws, watch, .. } = search;
     let open = beam.iter().flat_map(|set| laws.iter().filter(|law| may_join(set, law)).map(move |law| (set, *law)));
+    // What turns a table round may have stood in for what is before the table.
+    let stood_in: Vec<Fit> = beam.iter().filter_map(|set| without_stand_in(bench, set)).collect();
+    let in_its_place = |set| laws.iter().filter(|law| law.is_simulated()).map(move |law| (set, *law));
+    let open = open.chain(stood_in.iter().flat_map(in_its_place));
     // Simulations take longest. Beside causes without one they are asked where no law that is worked out row by row is to be
     // carried on and halves what is left, or leaves little: beside one that is they are asked next, which shows what only
     // imitates them.
@@ -285,6 +289,15 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
     grown.splice(..carried_on, formed);
     sort_by_price(&mut grown);
     Ok(grown)
+}
+
+/// A set without what turns a table round, where it has that and no table.
+fn without_stand_in(bench: &Bench, set: &Fit) -> Option<Fit> {
+    let at = set.parts.iter().position(|part| part.law.manner.turns_table)?;
+    let mut parts = set.parts.clone();
+    parts.remove(at);
+    let apart = parts.iter().any(|part| part.law.is_simulated());
+    (!apart && !parts.is_empty()).then(|| bench.fit(parts))
 }
 
 /// The sets with each of these laws added that may come among the best beside others: those that are worth it, best first.

@@ -34,6 +34,8 @@ pub enum Kind {
     Two,
     /// Two to four numbers of the belief are wrong, and in half of the cases there is something else as well.
     Beliefs,
+    /// A spring or a clearance, beside a friction or a load under which it winds up or is crossed: small or large.
+    BeforeTable,
     Outside(&'static str),
 }
 
@@ -63,6 +65,7 @@ impl Kind {
             "none" => Some(Self::Nothing),
             "two" => Some(Self::Two),
             "beliefs" => Some(Self::Beliefs),
+            "before_table" => Some(Self::BeforeTable),
             _ => (effects::CAUSES.iter().find(|c| **c == name).map(|c| Self::One(c)))
                 .or_else(|| outside::NAMES.iter().find(|c| **c == name).map(|c| Self::Outside(c))),
         }
@@ -213,6 +216,14 @@ fn together(kind: Kind, rig: &Rig, random: &mut Random) -> Option<Vec<&'static s
     let (beliefs, others): (Vec<&str>, Vec<&str>) = causes.iter().partition(|c| effects::BELIEFS.contains(c));
     let list = if kind == Kind::Two {
         vec![random.pick(&causes), random.pick(&causes)]
+    } else if kind == Kind::BeforeTable {
+        let (before, resisting): (Vec<&str>, Vec<&str>) =
+            causes.iter().partition(|c| effects::BEFORE_TABLE.contains(c));
+        let resisting: Vec<&str> = resisting.into_iter().filter(|c| effects::RESISTING.contains(c)).collect();
+        if before.is_empty() {
+            return None;
+        }
+        return Some(vec![random.pick(&before), random.pick(&resisting)]);
     } else {
         let left_out = random.uniform(0.0, 2.0 * beliefs.len() as f64) as usize;
         let mut list: Vec<&str> = (0..beliefs.len()).filter(|i| *i != left_out).map(|i| beliefs[i]).collect();
@@ -259,10 +270,11 @@ impl Case {
                 sizes.push(bench.fit(&mut effect, target, noise_may_move)?);
                 hidden.push(effect);
             }
-            Kind::Two | Kind::Beliefs => {
+            Kind::Two | Kind::Beliefs | Kind::BeforeTable => {
+                let largest = if kind == Kind::BeforeTable { 40.0 } else { 8.0 };
                 for cause in together(kind, &bench.rig, random)? {
                     let mut effect = Effect::draw(cause, &bench.rig, bench.peak, random);
-                    let target = random.log_uniform(1.5, 8.0);
+                    let target = random.log_uniform(1.5, largest);
                     sizes.push(bench.fit(&mut effect, target, false)?);
                     hidden.push(effect);
                 }

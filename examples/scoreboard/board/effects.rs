@@ -60,6 +60,19 @@ pub struct Parameter {
     pub scored: bool,
 }
 
+/// Causes between motor and table, and those under which a table winds its drive up or crosses a clearance.
+pub const BEFORE_TABLE: [&str; 2] = ["backlash", "drive_compliance"];
+pub const RESISTING: [&str; 8] = [
+    "coulomb_friction_mismatch",
+    "viscous_friction_mismatch",
+    "constant_torque",
+    "direction_dependent_friction",
+    "stribeck_friction",
+    "presliding_friction",
+    "position_dependent_friction",
+    "thermal_drift",
+];
+
 /// Whether a cause can be on such a rig at all.
 pub fn possible(cause: &str, rig: &Rig) -> bool {
     match cause {
