@@ -84,6 +84,8 @@ pub struct Frame<'a> {
     pub a: Vec<f64>,
     /// Speed as the encoder shows it, by central differences, load units/s.
     pub raw_speed: Vec<f64>,
+    /// Smoothed speed of the table, load units/s; empty without a scale.
+    pub table_v: Vec<f64>,
     /// Direction of sliding, mean over the row: −1 to 1.
     pub direction: Vec<f64>,
     /// The encoder's grid, load units.
@@ -136,11 +138,13 @@ impl<'a> Frame<'a> {
         let low_pass = LowPass {
             width: width.unwrap_or_else(|| fit_width(position_noise * unit * belief.inertia / (h * h), torque_noise)),
         };
-        let central = map_rows(columns, |x, i| (x[i + 1] - x[i - 1]) / (2.0 * h));
-        let bend = map_rows(columns, |x, i| (x[i + 1] - 2.0 * x[i] + x[i - 1]) / (h * h));
+        let speed = |x: &[f64], i: usize| (x[i + 1] - x[i - 1]) / (2.0 * h);
+        let central = map_rows(columns, &columns.position, speed);
+        let bend = map_rows(columns, &columns.position, |x, i| (x[i + 1] - 2.0 * x[i] + x[i - 1]) / (h * h));
         let x = low_pass.run(&columns.position, stretches);
         let v = low_pass.run(&central, stretches);
         let a = low_pass.run(&bend, stretches);
+        let table_v = columns.table.as_ref().map(|table| low_pass.run(&map_rows(columns, table, speed), stretches));
         let resolution = grid.max(3.0 * scatter).max(1e-12);
         let resting = resting_rows(columns, resolution);
         let direction = direction_of(columns, &v, &a, resolution);
@@ -186,6 +190,7 @@ impl<'a> Frame<'a> {
             v,
             a,
             raw_speed: central,
+            table_v: table_v.unwrap_or_default(),
             direction,
             grid,
             sampling,
@@ -453,9 +458,8 @@ fn believed_delay(axis: &Axis) -> f64 {
     axis.effects.iter().filter_map(delay).sum()
 }
 
-/// Applies a three-point rule to the position inside each stretch; end rows repeat their neighbour.
-fn map_rows(columns: &Columns, rule: impl Fn(&[f64], usize) -> f64) -> Vec<f64> {
-    let x = &columns.position;
+/// Applies a three-point rule to a position inside each stretch; end rows repeat their neighbour.
+fn map_rows(columns: &Columns, x: &[f64], rule: impl Fn(&[f64], usize) -> f64) -> Vec<f64> {
     let mut out = vec![0.0; x.len()];
     for s in &columns.stretches {
         if s.len() < 3 {

@@ -16,7 +16,8 @@ const ALIKE: f64 = 3e-4;
 pub struct Resistance {
     /// The axis that has it.
     axis: Axis,
-    /// Largest dry friction at each row.
+    /// Largest dry friction of the table at each row. At the speed that is measured, its own where it has a scale: one that is simulated
+    /// behind a motor that moves as measured has no servo that answers, and friction which falls with its speed would set it swinging.
     pub(super) level: Vec<f64>,
     /// Dry friction of the measured motion at each row.
     pub(super) dry: Vec<f64>,
@@ -77,23 +78,24 @@ impl Resistance {
         let (x, v, scale) = (&frame.columns.position, &frame.v, frame.unit);
         let [backward, forward] = [-1.0, 1.0].map(|way| physics.slope_at(way));
         let rows = 0..x.len();
-        let level: Vec<f64> =
-            rows.clone().map(|i| physics.friction_level(frame.x[i], v[i], frame.seconds(i))).collect();
-        let mut dry: Vec<f64> =
-            level.iter().zip(&frame.direction).map(|(level, direction)| level * direction).collect();
+        let level_at = |v: &[f64]| -> Vec<f64> {
+            rows.clone().map(|i| physics.friction_level(frame.x[i], v[i], frame.seconds(i))).collect()
+        };
+        let of_motor = level_at(v);
+        let mut dry: Vec<f64> = of_motor.iter().zip(&frame.direction).map(|(level, way)| level * way).collect();
         let bristle = physics.bristle_stiffness().map(|stiffness| (physics.bristle(1.0), stiffness));
         if let Some((at_rest, _)) = &bristle {
             for stretch in &frame.columns.stretches {
                 let mut friction = *at_rest;
                 for i in stretch.clone().skip(1) {
-                    dry[i] = friction.moved((x[i] - x[i - 1]) * scale, level[i]);
+                    dry[i] = friction.moved((x[i] - x[i - 1]) * scale, of_motor[i]);
                 }
             }
         }
         Self {
             axis: axis.clone(),
             dry,
-            level,
+            level: if frame.table_v.is_empty() { of_motor } else { level_at(&frame.table_v) },
             even: v.iter().map(|v| 0.5 * (forward - backward) * (v * scale).abs()).collect(),
             load: rows.map(|i| physics.load(frame.x[i], v[i], frame.seconds(i))).collect(),
             viscous: 0.5 * (forward + backward),
