@@ -159,6 +159,17 @@ fn fixed_cases_are_named() {
     assert!((1e-5..0.03).contains(&error), "median parameter error {error}");
 }
 
+/// A drive winds up, and a clearance is crossed, by all the friction and load that there is, not by that of the belief alone: where it is
+/// that of the belief, tables go elsewhere, and the hold-out is half as far off again.
+#[test]
+fn springs_and_clearances_are_told_beside_what_resists_the_table() {
+    let summary = summarise(&diagnosed(1, &[Kind::BeforeTable; 8], 12.0, false));
+    assert_eq!((summary.failures, summary.first_right, summary.wrong_beside), (0, (8, 8), (0, 8)));
+    assert!(summary.both_of_two.0 >= 7, "{:?}", summary.both_of_two);
+    let residual = summary.against_truth.unwrap();
+    assert!((0.9..1.1).contains(&residual), "{residual}");
+}
+
 /// Encoder noise, friction of other formulations and pulses on the torque are no faults, and hide none.
 #[test]
 fn rough_rigs_raise_no_alarm() {
