@@ -261,7 +261,10 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
     let Search { bench, laws, watch, .. } = search;
     let open = beam.iter().flat_map(|set| laws.iter().filter(|law| may_join(set, law)).map(move |law| (set, *law)));
     // What turns a table round may have stood in for what is before the table.
-    let stood_in: Vec<Fit> = beam.iter().filter_map(|set| without_stand_in(bench, set)).collect();
+    let stood_in: Vec<Fit> = match much_left(bench, beam.iter()) {
+        true => beam.iter().filter_map(|set| without_stand_in(bench, set)).collect(),
+        false => Vec::new(),
+    };
     let in_its_place = |set| laws.iter().filter(|law| law.is_simulated()).map(move |law| (set, *law));
     let open = open.chain(stood_in.iter().flat_map(in_its_place));
     // Simulations take longest. Beside causes without one they are asked where no law that is worked out row by row is to be
@@ -291,6 +294,13 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
     Ok(grown)
 }
 
+/// Whether the best of some sets leaves much. Where it leaves little no other comes before it by much, and tables need not be turned
+/// round for that.
+fn much_left<'s>(bench: &Bench, sets: impl Iterator<Item = &'s Fit>) -> bool {
+    let best = sets.min_by(|a, b| price(a).total_cmp(&price(b)));
+    best.is_some_and(|best| Excess::of(bench, best, best).largest() > LITTLE_LEFT)
+}
+
 /// A set without what turns a table round, where it has that and no table.
 fn without_stand_in(bench: &Bench, set: &Fit) -> Option<Fit> {
     let at = set.parts.iter().position(|part| part.law.manner.turns_table)?;
@@ -309,9 +319,7 @@ fn with_one_more(
 ) -> Result<Vec<Fit>, Stopped> {
     let Search { bench, watch, .. } = search;
     let half = 0.5 * (from + to);
-    // Where the best set leaves little no other can come before it by much, and tables need not be turned round for it.
-    let sets = open.iter().map(|(set, _)| *set).min_by(|a, b| price(a).total_cmp(&price(b)));
-    let much_left = sets.is_some_and(|best| Excess::of(bench, best, best).largest() > LITTLE_LEFT);
+    let much_left = much_left(bench, open.iter().map(|(set, _)| *set));
     let look = |&(set, law): &(_, _)| at_best_starts(search, set, law, much_left);
     let mut children: Vec<Child> =
         watch.each(open, (from, half), "looking for causes", look)?.into_iter().flatten().collect();

@@ -59,7 +59,10 @@ impl Bench<'_, '_> {
                     moved.push(slope.part);
                 }
                 moved.dedup();
-                let resistance = self.resistance_by(&parts, &fit.coefficients);
+                let resistance = match parts.iter().any(|part| part.law.is_simulated()) {
+                    true => self.resistance_by(&parts, &fit.coefficients),
+                    false => self.resistance.clone(),
+                };
                 for (i, part) in parts.iter_mut().enumerate() {
                     if moved.contains(&i) || moves_otherwise(part, &resistance) {
                         *part = self.parts_under(part.law, vec![part.shape.clone()], &resistance).swap_remove(0);
