@@ -32,7 +32,7 @@ pub struct Resistance {
 }
 
 impl Resistance {
-    /// That of an axis, whatever it has between motor and table; of the frame's belief where its effects contradict each other.
+    /// That of an axis, whatever it has between motor and table.
     #[must_use]
     pub fn of(frame: &Frame, axis: &Axis) -> Self {
         let resisting = axis.with_effects(axis.effects.iter().filter(|e| Self::has(e)).copied().collect());
