@@ -249,10 +249,12 @@ impl Child<'_> {
         list
     }
 
-    /// The price that refining may reach.
-    fn within_reach(&self) -> f64 {
+    /// The price that refining may reach beside sets of so many causes. In the place of a cause that has left, which leaves much, most
+    /// starts gain something: those that lie close show half.
+    fn within_reach(&self, causes: usize) -> f64 {
         let before = price(self.set);
-        before - (before - self.price).max(LEAST_AT_START) / SHOWN_AT_START
+        let shown = if self.set.parts.len() < causes { 2.0 * SHOWN_AT_START } else { SHOWN_AT_START };
+        before - (before - self.price).max(LEAST_AT_START) / shown
     }
 }
 
@@ -261,10 +263,7 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
     let Search { bench, laws, watch, .. } = search;
     let open = beam.iter().flat_map(|set| laws.iter().filter(|law| may_join(set, law)).map(move |law| (set, *law)));
     // What turns a table round may have stood in for what is before the table.
-    let stood_in: Vec<Fit> = match much_left(bench, beam.iter()) {
-        true => beam.iter().filter_map(|set| without_stand_in(bench, set)).collect(),
-        false => Vec::new(),
-    };
+    let stood_in: Vec<Fit> = beam.iter().take(1).filter_map(|set| without_stand_in(bench, set)).collect();
     let in_its_place = |set| laws.iter().filter(|law| law.is_simulated()).map(move |law| (set, *law));
     let open = open.chain(stood_in.iter().flat_map(in_its_place));
     // Simulations take longest. Beside causes without one they are asked where no law that is worked out row by row is to be
@@ -331,11 +330,12 @@ fn with_one_more(
     let mut prices: Vec<f64> = children.iter().map(|child| child.price).chain(others.iter().map(price)).collect();
     prices.sort_by(f64::total_cmp);
     let carried_on = prices.get(BEAM - 1).copied().unwrap_or(f64::INFINITY);
+    let most = open.iter().map(|(set, _)| set.parts.len()).max().unwrap_or(0);
     let mut tried: HashMap<Vec<Cause>, usize> = HashMap::new();
     children.retain(|child| {
         let count = tried.entry(causes(child.set)).or_default();
         *count += 1;
-        *count <= TRIED && child.within_reach() < carried_on
+        *count <= TRIED && child.within_reach(most) < carried_on
     });
     children.sort_by_key(|child| !child.part.law.is_simulated());
     let fits =
