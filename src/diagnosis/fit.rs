@@ -319,6 +319,12 @@ impl Fit {
         pairs.filter_map(|(part, c)| (part.law.effect)(frame, &part.shape, c))
     }
 
+    /// Which part simulates the table behind a spring or a clearance; there is one at most.
+    #[must_use]
+    pub fn table(&self) -> Option<usize> {
+        self.parts.iter().position(|part| part.law.is_simulated())
+    }
+
     /// Number of fitted numbers.
     #[must_use]
     pub fn numbers(&self) -> usize {

@@ -134,7 +134,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     /// A set without what is simulated behind the measured motion (a spring, a clearance), where that may gain by taking off what
     /// the encoder's noise makes alone: half of a channel's rest is never that.
     fn without_spring(&self, fit: &Fit) -> Option<Fit> {
-        let simulated = fit.parts.iter().position(|p| p.law.is_simulated())?;
+        let simulated = fit.table()?;
         let mut parts = fit.parts.clone();
         parts.remove(simulated);
         let less = self.bench.refine(self.bench.fit(parts), 0, 4);

@@ -9,6 +9,7 @@ use super::causes::{Law, Resistance, Trace, law, table_side};
 use super::frame::Frame;
 use super::many::dot;
 use crate::machine::{Axis, Cause, Effect};
+use crate::plant::friction::Friction;
 use crate::plant::physics::Physics;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::VecDeque;
@@ -136,16 +137,10 @@ fn largest_near(kept: &[usize], reach: usize, values: &[f64]) -> Vec<f64> {
 /// What friction that builds up is short of friction that is there at once. By the simulation's law: all of its level builds up, with
 /// what low speed, a place or the time adds to it.
 fn build_up(frame: &Frame, physics: &Physics) -> Trace {
-    let (x, scale) = (&frame.columns.position, physics.motor_per_load);
-    let mut short = vec![0.0; x.len()];
-    for stretch in &frame.columns.stretches {
-        let mut friction = physics.bristle(1.0);
-        for i in stretch.clone().skip(1) {
-            let level = physics.friction_level(x[i], frame.v[i], frame.seconds(i));
-            let dry = friction.moved((x[i] - x[i - 1]) * scale, level) + friction.damped(frame.v[i] * scale, level);
-            short[i] = dry - level * frame.direction[i];
-        }
-    }
+    let level = table_side::level(frame, physics, &frame.v);
+    let damped = |friction: &mut Friction, i: usize| friction.damped(frame.v[i] * frame.unit, level[i]);
+    let dry = table_side::built_up(frame, physics.bristle(1.0), &level, damped);
+    let short: Vec<f64> = dry.iter().zip(table_side::at_once(frame, &level)).map(|(dry, all)| dry - all).collect();
     Trace::torque(frame.judged(&short))
 }
 

@@ -179,7 +179,7 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
 
 /// A set with a simulated table, which the search refines but roughly, as far down as it goes.
 fn at_the_bottom(search: &Search, fit: &Fit) -> Result<Fit, Stopped> {
-    if !fit.parts.iter().any(|part| part.law.is_simulated()) {
+    if fit.table().is_none() {
         return Ok(fit.clone());
     }
     let refined = search.bench.refine_across(fit.clone(), 8, search.watch)?;
@@ -269,8 +269,7 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
     // Simulations take longest. Beside causes without one they are asked where no law that is worked out row by row is to be
     // carried on and halves what is left, or leaves little: beside one that is they are asked next, which shows what only
     // imitates them.
-    let simulated = |set: &Fit| set.parts.iter().any(|part| part.law.is_simulated());
-    let asked_last = beam.iter().all(|set| !set.parts.is_empty() && !simulated(set));
+    let asked_last = beam.iter().all(|set| !set.parts.is_empty() && set.table().is_none());
     let (mut first, last): (Vec<_>, Vec<_>) =
         open.partition(|(_, law): &(&Fit, &Law)| !(asked_last && law.is_simulated()));
     // What takes longest is begun first, lest a core have nothing left to do beside it.
@@ -305,8 +304,7 @@ fn without_stand_in(bench: &Bench, set: &Fit) -> Option<Fit> {
     let at = set.parts.iter().position(|part| part.law.manner.turns_table)?;
     let mut parts = set.parts.clone();
     parts.remove(at);
-    let apart = parts.iter().any(|part| part.law.is_simulated());
-    (!apart && !parts.is_empty()).then(|| bench.fit(parts))
+    (set.table().is_none() && !parts.is_empty()).then(|| bench.fit(parts))
 }
 
 /// The sets with each of these laws added that may come among the best beside others: those that are worth it, best first.
@@ -396,7 +394,7 @@ fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law, much_lef
     let numbers = |part: &Part| NUMBER_PRICE * part.free_parameters() as f64;
     let figure_with = |part: &Part| figure(&bench.joined(set, part)) + numbers(part);
     // What resists a simulated table is another with a friction more, and only then shows what that friction is worth.
-    let beside_table = set.parts.iter().any(|p| p.law.is_simulated()) || law.is_simulated() && !set.parts.is_empty();
+    let beside_table = set.table().is_some() || law.is_simulated() && !set.parts.is_empty();
     let at_one = |part: &Part| {
         let parts = set.parts.iter().chain([part]).cloned().collect();
         bench.at_one(bench.fit(parts)).figure() + numbers(part)
@@ -422,7 +420,7 @@ fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law, much_lef
 fn may_join(set: &Fit, law: &Law) -> bool {
     let same = set.parts.iter().filter(|p| p.law.cause == law.cause).count();
     // What stands between motor and table is one thing: two simulations do not add up.
-    if law.is_simulated() && set.parts.iter().any(|p| p.law.is_simulated()) {
+    if law.is_simulated() && set.table().is_some() {
         return false;
     }
     // A wave with a harmonic and one more, or one whose size swells and sinks (a line with one on either side). Two tight spots

@@ -19,7 +19,7 @@ const EVERY: usize = 3;
 /// # Errors
 /// [`Stopped`] when the watch's caller said so.
 pub fn settled(bench: &Bench, laws: &[&'static Law], fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
-    let Some(at) = fit.parts.iter().position(|part| part.law.is_simulated()) else { return Ok(fit) };
+    let Some(at) = fit.table() else { return Ok(fit) };
     if Excess::of(bench, &fit, &fit).largest() <= LITTLE_LEFT {
         return Ok(fit);
     }

@@ -217,9 +217,8 @@ fn together(kind: Kind, rig: &Rig, random: &mut Random) -> Option<Vec<&'static s
     let list = if kind == Kind::Two {
         vec![random.pick(&causes), random.pick(&causes)]
     } else if kind == Kind::BeforeTable {
-        let (before, resisting): (Vec<&str>, Vec<&str>) =
-            causes.iter().partition(|c| effects::BEFORE_TABLE.contains(c));
-        let resisting: Vec<&str> = resisting.into_iter().filter(|c| effects::RESISTING.contains(c)).collect();
+        let of = |is: fn(&str) -> bool| causes.iter().copied().filter(|c| is(c)).collect::<Vec<&str>>();
+        let (before, resisting) = (of(effects::before_table), of(effects::resists));
         if before.is_empty() {
             return None;
         }

@@ -60,18 +60,15 @@ pub struct Parameter {
     pub scored: bool,
 }
 
-/// Causes between motor and table, and those under which a table winds its drive up or crosses a clearance.
-pub const BEFORE_TABLE: [&str; 2] = ["backlash", "drive_compliance"];
-pub const RESISTING: [&str; 8] = [
-    "coulomb_friction_mismatch",
-    "viscous_friction_mismatch",
-    "constant_torque",
-    "direction_dependent_friction",
-    "stribeck_friction",
-    "presliding_friction",
-    "position_dependent_friction",
-    "thermal_drift",
-];
+/// Whether a cause lies between motor and table.
+pub fn before_table(cause: &str) -> bool {
+    ["backlash", "drive_compliance"].contains(&cause)
+}
+
+/// Whether a table winds its drive up, or crosses a clearance, otherwise with a cause: friction, or a load.
+pub fn resists(cause: &str) -> bool {
+    cause.contains("friction") || ["constant_torque", "thermal_drift"].contains(&cause)
+}
 
 /// Whether a cause can be on such a rig at all.
 pub fn possible(cause: &str, rig: &Rig) -> bool {
@@ -92,7 +89,7 @@ pub fn on_table_only(cause: &str) -> bool {
 /// Whether two causes may be hidden together: not two of those that all act within the lost motion of one reversal, and not
 /// a cable beside a constant torque, which is the same cable whose force is zero elsewhere.
 pub fn separable(a: &str, b: &str) -> bool {
-    let lost_motion = |c: &str| ["presliding_friction", "backlash", "drive_compliance"].contains(&c);
+    let lost_motion = |c: &str| before_table(c) || c == "presliding_friction";
     let level = |c: &str| ["constant_torque", "cable_force"].contains(&c);
     a != b && !(lost_motion(a) && lost_motion(b)) && !(level(a) && level(b))
 }

@@ -12,7 +12,7 @@ mod flanks;
 mod resistance;
 mod spring;
 
-pub use resistance::Resistance;
+pub use resistance::{Resistance, at_once, built_up, level};
 
 use super::*;
 use crate::diagnosis::many::widest;

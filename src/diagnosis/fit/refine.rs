@@ -59,9 +59,9 @@ impl Bench<'_, '_> {
                     moved.push(slope.part);
                 }
                 moved.dedup();
-                let resistance = match parts.iter().any(|part| part.law.is_simulated()) {
-                    true => self.resistance_by(&parts, &fit.coefficients),
-                    false => self.resistance.clone(),
+                let resistance = match fit.table() {
+                    Some(_) => self.resistance_by(&parts, &fit.coefficients),
+                    None => self.resistance.clone(),
                 };
                 for (i, part) in parts.iter_mut().enumerate() {
                     if moved.contains(&i) || moves_otherwise(part, &resistance) {
@@ -107,13 +107,12 @@ impl Bench<'_, '_> {
     /// A fit whose table, where one is simulated, moves under what its other causes make of friction and load.
     #[must_use]
     pub fn at_one(&self, fit: Fit) -> Fit {
-        if !fit.parts.iter().any(|part| part.law.is_simulated()) {
+        let Some(at) = fit.table() else { return fit };
+        let (part, resistance) = (&fit.parts[at], self.resistance_of(&fit));
+        if !moves_otherwise(part, &resistance) {
             return fit;
         }
-        let resistance = self.resistance_of(&fit);
-        let Some(at) = fit.parts.iter().position(|part| moves_otherwise(part, &resistance)) else { return fit };
-        let Part { law, shape, .. } = &fit.parts[at];
-        let own = self.parts_under(law, vec![shape.clone()], &resistance);
+        let own = self.parts_under(part.law, vec![part.shape.clone()], &resistance);
         let mut parts = fit.parts;
         parts.splice(at..=at, own);
         self.fit(parts)

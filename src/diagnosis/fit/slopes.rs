@@ -32,8 +32,7 @@ impl Bench<'_, '_> {
         let parts = fit.parts.iter().enumerate().skip(first);
         parts
             .flat_map(|(i, part)| {
-                let table =
-                    fit.parts.iter().find(|table| table.law.is_simulated()).filter(|_| part.law.manner.turns_table);
+                let table = fit.table().filter(|_| part.law.manner.turns_table).map(|at| &fit.parts[at]);
                 let slope = |side: &Side| {
                     let mut slope = self.slope(i, &fit.coefficients[i], side)?;
                     let way =

@@ -75,27 +75,18 @@ impl Resistance {
     }
 
     fn along(frame: &Frame, axis: &Axis, physics: &Physics) -> Self {
-        let (x, v, scale) = (&frame.columns.position, &frame.v, frame.unit);
+        let (v, scale) = (&frame.v, frame.unit);
         let [backward, forward] = [-1.0, 1.0].map(|way| physics.slope_at(way));
-        let rows = 0..x.len();
-        let level_at = |v: &[f64]| -> Vec<f64> {
-            rows.clone().map(|i| physics.friction_level(frame.x[i], v[i], frame.seconds(i))).collect()
-        };
-        let of_motor = level_at(v);
-        let mut dry: Vec<f64> = of_motor.iter().zip(&frame.direction).map(|(level, way)| level * way).collect();
+        let rows = 0..v.len();
+        let of_motor = level(frame, physics, v);
         let bristle = physics.bristle_stiffness().map(|stiffness| (physics.bristle(1.0), stiffness));
-        if let Some((at_rest, _)) = &bristle {
-            for stretch in &frame.columns.stretches {
-                let mut friction = *at_rest;
-                for i in stretch.clone().skip(1) {
-                    dry[i] = friction.moved((x[i] - x[i - 1]) * scale, of_motor[i]);
-                }
-            }
-        }
         Self {
             axis: axis.clone(),
-            dry,
-            level: if frame.table_v.is_empty() { of_motor } else { level_at(&frame.table_v) },
+            dry: match bristle {
+                Some((at_rest, _)) => built_up(frame, at_rest, &of_motor, |_, _| 0.0),
+                None => at_once(frame, &of_motor).collect(),
+            },
+            level: if frame.table_v.is_empty() { of_motor } else { level(frame, physics, &frame.table_v) },
             even: v.iter().map(|v| 0.5 * (forward - backward) * (v * scale).abs()).collect(),
             load: rows.map(|i| physics.load(frame.x[i], v[i], frame.seconds(i))).collect(),
             viscous: 0.5 * (forward + backward),
@@ -113,4 +104,32 @@ impl Resistance {
             && (self.viscous - other.viscous).abs() <= ALIKE * self.viscous.abs()
             && self.bristle.is_some() == other.bristle.is_some()
     }
+}
+
+/// Largest dry friction at each row, at speeds in load units/s.
+pub fn level(frame: &Frame, physics: &Physics, v: &[f64]) -> Vec<f64> {
+    (0..v.len()).map(|i| physics.friction_level(frame.x[i], v[i], frame.seconds(i))).collect()
+}
+
+/// Dry friction of the measured motion at each row, with its level there.
+pub fn at_once<'f>(frame: &'f Frame, level: &'f [f64]) -> impl Iterator<Item = f64> + 'f {
+    level.iter().zip(&frame.direction).map(|(level, direction)| level * direction)
+}
+
+/// The same as far as it has built up on the motor's way, and what `more` says that a bristle adds at a row.
+pub fn built_up(
+    frame: &Frame,
+    at_rest: Friction,
+    level: &[f64],
+    more: impl Fn(&mut Friction, usize) -> f64,
+) -> Vec<f64> {
+    let x = &frame.columns.position;
+    let mut dry: Vec<f64> = at_once(frame, level).collect();
+    for stretch in &frame.columns.stretches {
+        let mut friction = at_rest;
+        for i in stretch.clone().skip(1) {
+            dry[i] = friction.moved((x[i] - x[i - 1]) * frame.unit, level[i]) + more(&mut friction, i);
+        }
+    }
+    dry
 }
