@@ -14,6 +14,10 @@ use core::ffi::c_void;
 const ALIVE: u32 = 0x6769_6821;
 /// The same for an instance at work on two motors.
 const BOTH: u32 = 0x6769_6822;
+/// The same for an instance whose motors rest while it works.
+const RESTING: u32 = 0x6769_6824;
+/// The same of two motors.
+const RESTING_BOTH: u32 = 0x6769_6825;
 /// The same for an instance that has nothing to do but to follow the axis.
 const QUIET: u32 = 0x6769_6823;
 
@@ -27,7 +31,7 @@ pub struct GibHoming {
 
 impl Instance for GibHoming {
     fn alive(&self) -> bool {
-        [ALIVE, BOTH, QUIET].contains(&self.alive)
+        [ALIVE, BOTH, QUIET, RESTING, RESTING_BOTH].contains(&self.alive)
     }
     fn new() -> GibHoming {
         GibHoming { alive: QUIET, last: Fault::NONE, machine: Homing::default() }
@@ -43,6 +47,7 @@ impl GibHoming {
     fn mark(&mut self) {
         self.alive = match () {
             () if self.machine.quiet() => QUIET,
+            () if self.machine.rests() => [RESTING, RESTING_BOTH][usize::from(self.machine.gantry())],
             () if self.machine.gantry() => BOTH,
             () => ALIVE,
         };
@@ -214,6 +219,31 @@ extern "C" fn both_unlike(handle: &mut GibHoming, input: &HomingInput, output: &
     output.status
 }
 
+/// A cycle of an axis that rests while its touch is evaluated.
+#[inline(never)]
+extern "C" fn step_at_rest<const MOTORS: usize>(
+    handle: &mut GibHoming,
+    input: &HomingInput,
+    output: &mut HomingOutput,
+) -> i32 {
+    if !handle.machine.quick_at_rest::<MOTORS>(input) {
+        return step_whole(handle, input, output);
+    }
+    if handle.machine.works() {
+        return work_at_rest(handle, output);
+    }
+    *output = *handle.machine.output();
+    output.status
+}
+
+/// What is to be done in one.
+#[inline(never)]
+extern "C" fn work_at_rest(handle: &mut GibHoming, output: &mut HomingOutput) -> i32 {
+    handle.machine.work_at_rest();
+    *output = *handle.machine.output();
+    output.status
+}
+
 /// A cycle of which nothing is usual.
 #[inline(never)]
 extern "C" fn step_whole(handle: &mut GibHoming, input: &HomingInput, output: &mut HomingOutput) -> i32 {
@@ -233,9 +263,14 @@ extern "C" fn step_unlike(handle: &mut GibHoming, input: &HomingInput, output: &
     output.status
 }
 
-/// A cycle of an instance that has nothing to do, or of no living one. `extern "C"` as above.
+/// A cycle of an instance that has nothing to do, whose motors rest, or of no living one. `extern "C"` as above.
 #[inline(never)]
 extern "C" fn step_from_rest(handle: &mut GibHoming, input: &HomingInput, output: &mut HomingOutput) -> i32 {
+    match handle.alive {
+        RESTING => return step_at_rest::<1>(handle, input, output),
+        RESTING_BOTH => return step_at_rest::<2>(handle, input, output),
+        _ => {}
+    }
     if !handle.alive() {
         return misused(Some(handle), Some(input), Some(output));
     }

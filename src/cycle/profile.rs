@@ -87,6 +87,23 @@ impl Profile {
         self.position += self.speed;
     }
 
+    /// The same as [`Profile::step`] so far from the goal that it neither arrives nor could be carried past it.
+    #[inline(always)]
+    pub fn step_under_way(&mut self) {
+        self.speed = self.towards_goal();
+        self.position += self.speed;
+    }
+
+    /// The speed toward the goal from which it still stops in time.
+    #[inline(always)]
+    fn towards_goal(&self) -> f64 {
+        let (a, left) = (self.acceleration, self.left());
+        // Braking by a each cycle takes v + (v − a) + … = v·(v + a)/(2a); the largest v that still stops in time.
+        let stops = (0.25 * a * a + 2.0 * a * left.abs()).sqrt() - 0.5 * a;
+        let wanted = lower(stops, self.speed_max).copysign(left);
+        lower(higher(wanted, self.speed - a), self.speed + a)
+    }
+
     /// Advances by one cycle. Returns true once the goal is reached and the axis commanded to rest.
     pub fn step(&mut self) -> bool {
         let a = self.acceleration;
@@ -96,10 +113,7 @@ impl Profile {
             self.speed = 0.0;
             return true;
         }
-        // Braking by a each cycle takes v + (v − a) + … = v·(v + a)/(2a); the largest v that still stops in time.
-        let stops = (0.25 * a * a + 2.0 * a * left.abs()).sqrt() - 0.5 * a;
-        let wanted = lower(stops, self.speed_max).copysign(left);
-        let speed = lower(higher(wanted, self.speed - a), self.speed + a);
+        let speed = self.towards_goal();
         // Between whole multiples of a the sum above is short by up to a/8, which must not carry past the goal.
         let past = speed * left > left * left;
         self.speed = if past { left } else { speed };

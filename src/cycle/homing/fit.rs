@@ -213,8 +213,33 @@ impl Fit {
         (early.n >= FEWEST && error.is_finite() && slope > most).then_some([slope, most])
     }
 
-    /// One slice; true when ready.
+    /// One cycle: counts it and does a slice of the work; true when ready.
     pub fn slice(&mut self, trace: &Trace) -> bool {
+        self.count();
+        self.work(trace)
+    }
+
+    /// Counts a cycle.
+    #[inline(always)]
+    pub fn count(&mut self) {
+        self.cycles += 1;
+    }
+
+    /// Whether a counted cycle has work left, beside resting.
+    #[inline(always)]
+    #[must_use]
+    pub fn works(&self) -> bool {
+        self.stage != Stage::Ready
+    }
+
+    /// Cycles of rest before the one that ends it; no end while there is work left.
+    #[must_use]
+    pub fn rests(&self) -> u32 {
+        if self.works() { u32::MAX } else { self.rest.saturating_sub(self.cycles + 1) }
+    }
+
+    /// The work of a counted cycle; true when ready.
+    pub fn work(&mut self, trace: &Trace) -> bool {
         match self.stage {
             Stage::Window => self.find_window(trace),
             Stage::Torques => self.sum_torques(trace),
@@ -225,7 +250,6 @@ impl Fit {
             Stage::Early => self.sum_early(trace),
             Stage::Ready => {}
         }
-        self.cycles += 1;
         self.stage == Stage::Ready && self.cycles >= self.rest
     }
 

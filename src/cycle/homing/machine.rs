@@ -21,6 +21,7 @@ mod gantry;
 mod quick;
 #[cfg(test)]
 mod quick_tests;
+mod resting;
 mod sequence;
 mod way_out;
 
@@ -67,6 +68,9 @@ pub struct Homing {
     /// All that is to be done is to move or to press: most cycles are like the one before.
     quick: bool,
     usual: quick::Usual,
+    /// The next cycles may be usual ones of an axis that rests, and how many.
+    at_rest: bool,
+    rests_on: i32,
     /// First fault of this run.
     fault: Fault,
     /// What the evaluation of the touch found wrong.
@@ -100,6 +104,8 @@ impl Default for Homing {
             phase: Phase::Idle,
             quick: false,
             usual: quick::Usual::default(),
+            at_rest: false,
+            rests_on: 0,
             fault: Fault::NONE,
             suspect: Fault::NONE,
             now: 0,
@@ -217,11 +223,11 @@ impl Homing {
     /// One servo cycle of a single motor if it is like the one before, which most are; when it is not, [`Homing::quick_slow`] must follow.
     #[inline(always)]
     pub fn quick(&mut self, input: &HomingInput) -> bool {
-        let [side, _] = &mut self.sides;
+        let ([side, _], target) = (&mut self.sides, self.output.target_position_mm[0]);
         let odd = u64::from(input.flags) | (input.torque_limit.to_bits() ^ self.in_force);
-        let done = side.quick(&self.plan, input.position_mm[0], input.torque[0], odd);
+        let done = side.quick(&self.plan, target, [input.position_mm[0], input.torque[0]], odd);
         if done {
-            self.output.target_position_mm[0] = side.profile.position;
+            self.output.target_position_mm[0] = target + side.profile.speed;
         }
         done
     }
@@ -230,6 +236,7 @@ impl Homing {
     #[inline(always)]
     pub fn quick_slow(&mut self, input: &HomingInput) -> bool {
         let [side, _] = &mut self.sides;
+        side.profile.position = self.output.target_position_mm[0];
         let odd = u64::from(input.flags) | (input.torque_limit.to_bits() ^ self.in_force);
         let done = side.quick_slow(&self.plan, input.position_mm[0], input.torque[0], odd);
         if done {
@@ -251,6 +258,8 @@ impl Homing {
         // Not in a cycle that has much to do anyway.
         if was_quick && self.quick && self.output.new_events == 0 && !caught_up {
             self.see_usual(self.deadline.saturating_sub(self.now + 2));
+        } else if self.phase == Phase::Evaluate {
+            self.see_rest();
         }
     }
 

@@ -53,10 +53,20 @@ pub struct Side {
     granted: u32,
     usual_lag: f64,
     lag_band: f64,
+    /// All of them are at constant speed, on the way back or to the zero offset.
+    slides: bool,
+    /// In none of them anybody looks whether the torque changes; what it was before, and filtered.
+    listens_not: bool,
+    heard_first: [f64; 2],
     /// The same for a cycle that is not at constant speed, and the filtered torque within which it counts as usual.
     slow: u32,
     low: f64,
     high: f64,
+    /// Of one that rests: the change of the command's speed in those cycles, where it is always the same; cycles in which position and
+    /// torque reading changed last.
+    rate: f64,
+    moved: u32,
+    heard: u32,
     /// Where homing began, mm.
     pub start: f64,
     /// Where the present touch began, mm.
@@ -139,7 +149,13 @@ impl Side {
     /// Whether this cycle's readings are within all bounds.
     #[inline(always)]
     pub fn safe(&self, plan: &Plan, position: f64, torque: f64) -> bool {
-        (position - self.position).abs() <= plan.jump && self.bounded(plan, position, torque)
+        self.near(plan, position) && torque.is_finite() && self.filtered.abs() <= plan.bound
+    }
+
+    /// Whether the position is within all bounds.
+    #[inline(always)]
+    fn near(&self, plan: &Plan, position: f64) -> bool {
+        (position - self.position).abs() <= plan.jump && self.placed(plan, position)
     }
 
     /// The same, but for a jump that a motor makes whose torque is taken off while it is pressed: drive and stop, which give
@@ -147,15 +163,16 @@ impl Side {
     #[must_use]
     pub fn springs_back(&self, plan: &Plan, position: f64, torque: f64, press: f64) -> bool {
         let back = plan.sense * (self.anchor - position);
-        (-plan.jump..=3.0 * press + plan.jump).contains(&back) && self.bounded(plan, position, torque)
+        (-plan.jump..=3.0 * press + plan.jump).contains(&back)
+            && self.placed(plan, position)
+            && torque.is_finite()
+            && self.filtered.abs() <= plan.bound
     }
 
     #[inline(always)]
-    fn bounded(&self, plan: &Plan, position: f64, torque: f64) -> bool {
+    fn placed(&self, plan: &Plan, position: f64) -> bool {
         (self.profile.position - position).abs() <= plan.lag_limit
             && plan.sense * (position - self.start) <= plan.distance[1]
-            && torque.is_finite()
-            && self.filtered.abs() <= plan.bound
     }
 
     /// Takes in a cycle's readings. What no drive can give counts as so much that it breaks the bound in one cycle, and no more:
@@ -180,13 +197,19 @@ impl Side {
     /// Takes note of whether the torque reading is alive, and how noisy.
     #[inline(always)]
     fn hear(&mut self, plan: &Plan, position: f64, torque: f64) {
+        self.bend(plan, torque);
+        self.watch(position, torque);
+        self.reading = torque;
+    }
+
+    /// Takes note of how noisy the torque reading is.
+    #[inline(always)]
+    fn bend(&mut self, plan: &Plan, torque: f64) {
         let change = torque - self.reading;
         let bend = change - self.change;
         // One jump is no noise.
         self.rough += ROUGH_GAIN * (lower(bend.abs(), 0.5 * plan.limit) - self.rough);
         self.change = change;
-        self.watch(position, torque);
-        self.reading = torque;
     }
 
     /// Takes note of whether the torque reading is alive.

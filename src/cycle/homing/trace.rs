@@ -39,6 +39,8 @@ pub struct Trace {
     length: u32,
     /// Cycles after which a block is full: `length`, or `PAUSED`.
     full: u32,
+    /// Whether every cycle is a block, as most often.
+    even: bool,
     in_block: u32,
     position: f64,
     torque: f64,
@@ -73,6 +75,7 @@ impl Default for Trace {
             share: 1.0,
             length: 1,
             full: PAUSED,
+            even: false,
             in_block: 0,
             position: 0.0,
             torque: 0.0,
@@ -88,7 +91,7 @@ impl Trace {
     pub fn start(&mut self, length: u32, origin: f64, sense: f64, torque_sense: f64) {
         self.frame = Frame { origin, sense, torque_sense };
         self.length = length.max(1);
-        self.full = self.length;
+        (self.full, self.even) = (self.length, self.length == 1);
         self.share = 1.0 / f64::from(self.length);
         self.written = 0;
         self.in_block = 0;
@@ -98,13 +101,13 @@ impl Trace {
 
     /// Keeps what is there until the next start or `resume`, whatever is added.
     pub fn pause(&mut self) {
-        self.full = PAUSED;
+        (self.full, self.even) = (PAUSED, false);
         self.in_block = 0;
     }
 
     /// Goes on after a pause, with a new block.
     pub fn resume(&mut self) {
-        self.full = self.length;
+        (self.full, self.even) = (self.length, self.length == 1);
         self.in_block = 0;
         self.position = 0.0;
         self.torque = 0.0;
@@ -119,13 +122,13 @@ impl Trace {
     /// Whether every cycle is a block here and there, of the same place.
     #[must_use]
     pub fn even_with(&self, other: &Trace) -> bool {
-        self.full == 1 && other.full == 1 && self.written == other.written
+        self.even && other.even && self.written == other.written
     }
 
     /// Adds the position (mm) and torque of a cycle, as they were read; false when paused.
     #[inline(always)]
     pub fn add(&mut self, position: f64, torque: f64) -> bool {
-        if self.full == 1 {
+        if self.even {
             self.put([position, torque]);
             return true;
         }

@@ -403,8 +403,13 @@ impl Homing {
     /// Ends what was granted: the sides catch up, if cycles went by.
     #[inline(always)]
     pub(super) fn end_usual(&mut self) -> bool {
-        self.now = self.now.saturating_add(self.sides[0].quick_cycles());
-        self.sides[0].look_no_further();
+        self.end_rest();
+        let single = self.sides[0].quick_cycles();
+        if single > 0 {
+            self.now = self.now.saturating_add(single);
+            self.sides[0].profile.position = self.output.target_position_mm[0];
+        }
+        self.sides[0].look_no_further(&self.plan);
         let went = self.usual.gone() > 0;
         if went {
             self.catch_up();
@@ -415,7 +420,7 @@ impl Homing {
 
     fn catch_up(&mut self) {
         for (i, side) in self.sides.iter_mut().enumerate().take(self.plan.motors) {
-            side.catch_up(&self.usual.caught(i, self.output.target_position_mm[i & 1]));
+            side.catch_up(&self.plan, &self.usual.caught(i, self.output.target_position_mm[i & 1]));
         }
         self.now = self.now.saturating_add(self.usual.gone());
     }

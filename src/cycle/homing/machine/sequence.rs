@@ -108,7 +108,7 @@ impl Homing {
     }
 
     #[cold]
-    fn fitted_side(&mut self) {
+    pub(super) fn fitted_side(&mut self) {
         let i = self.fitting & 1;
         let side = &self.sides[i];
         let offset = self.plan.sense * (side.origin - side.start);

@@ -70,7 +70,8 @@ impl Side {
         let to_end = plan.distance[1] - plan.sense * (p.position - self.start) - plan.lag_limit;
         let away = p.left() * plan.sense < 0.0;
         let free = lower(way, if away { way } else { to_end });
-        let cruise = |before: f64| (lower(way - before - p.braking() - 2.0 * speed, free - before) / speed) as u32;
+        // A cycle's rounding must not count as a cycle.
+        let cruise = |before: f64| (lower(way - before - p.braking(), free - before) / speed - 1e-6) as u32;
         if p.cruises() {
             return Ahead { cruise: cruise(0.0), ..ahead };
         }
@@ -93,25 +94,55 @@ impl Side {
     }
 
     /// Takes over what usual cycles have made of it.
-    pub fn catch_up(&mut self, caught: &Caught) {
+    pub fn catch_up(&mut self, plan: &Plan, caught: &Caught) {
+        let first = self.heard_now(plan);
         if self.held {
             self.standing += caught.cycles;
         }
         self.frozen = caught.frozen;
         self.position = caught.position;
-        // At constant speed nobody looks whether the torque changes from one cycle to the next.
-        (self.same, self.changed_at) = match () {
-            () if caught.alive => (0, caught.changed_at),
-            () if caught.reading != self.reading => (0, caught.position),
-            () => (self.same.saturating_add(caught.cycles), self.changed_at),
-        };
-        self.reading = caught.reading;
-        self.filtered = caught.filtered;
+        (self.reading, self.filtered) = (caught.reading, caught.filtered);
+        if caught.alive {
+            (self.same, self.changed_at) = (0, caught.changed_at);
+        } else {
+            self.hear_again(caught.cycles, first, self.heard_now(plan));
+        }
+        self.quieten();
         self.lowest = caught.lowest;
         self.sliding = caught.sliding;
         self.free = caught.free;
         self.profile.position = caught.target;
         self.profile.speed = caught.speed;
+    }
+
+    /// The torque as it was read last and as it is filtered, in the same sense.
+    #[inline(always)]
+    pub(super) fn heard_now(&self, plan: &Plan) -> [f64; 2] {
+        [plan.torque_sense * self.reading, self.filtered]
+    }
+
+    /// Takes note of whether the torque reading is alive, after that many cycles in which nobody did: of one that stands the filtered
+    /// torque comes near.
+    pub(super) fn hear_again(&mut self, cycles: u32, first: [f64; 2], [reading, filtered]: [f64; 2]) {
+        // How much nearer, for sure.
+        let far = match cycles {
+            0..64 => f64::INFINITY,
+            64..256 => 2e-4,
+            _ => 1e-14,
+        };
+        let near = far * (first[1] - reading).abs() + 1e-9 * reading.abs();
+        if reading == first[0] && !((filtered - reading).abs() > near) {
+            self.same = self.same.saturating_add(cycles);
+        } else {
+            (self.same, self.changed_at) = (0, self.position);
+        }
+    }
+
+    /// A torque that has not changed for long has no noise.
+    pub(super) fn quieten(&mut self) {
+        if self.same >= 64 {
+            (self.rough, self.change) = (0.0, 0.0);
+        }
     }
 
     /// Whether a torque that no longer changed would, within the way of a standing axis, not be taken for a stuck one.
