@@ -19,12 +19,14 @@ use super::valleys;
 use crate::machine::Cause;
 use std::collections::{HashMap, HashSet};
 
+mod starts;
+
+use starts::{Child, at_best_starts};
+
 /// Sets that are carried on.
 const BEAM: usize = 2;
 /// Causes refined for each set that grows.
 const TRIED: usize = 6;
-/// Of the starts of a law that turns a table round in another way, which is simulated anew for each, one in so many is tried.
-const EVERY: usize = 3;
 /// Most causes in a set.
 const MOST: usize = 6;
 /// Starts of a law that are laid out in one go; springs are stepped as many side by side.
@@ -32,12 +34,6 @@ const AT_A_TIME: usize = 8;
 /// Least gain of a cause in Σ ln(mean square): 8 % of what is left. A smaller one would not be worth a machinist's time,
 /// and imperfect filters, grids and reversals make up to half of it on machines without any fault.
 pub const LEAST_GAIN: f64 = 0.08;
-/// Least share of what refining brings that a cause shows at its best start. Starts lie close enough for half.
-const SHOWN_AT_START: f64 = 0.25;
-/// Least gain at the best start for a cause to be refined.
-const LEAST_AT_START: f64 = SHOWN_AT_START * LEAST_GAIN;
-/// The same of a ripple of few periods, which explains some of anything that is slow along the stroke: a third of what is left.
-const LEAST_OF_FEW: f64 = 0.4;
 /// What a further fitted number must gain where sets of causes compete.
 pub const NUMBER_PRICE: f64 = 0.003;
 
@@ -232,32 +228,6 @@ fn same_causes(a: &Fit, b: &Fit) -> bool {
     causes(a) == causes(b)
 }
 
-/// A cause at its best start beside a set.
-struct Child<'s> {
-    set: &'s Fit,
-    part: Part,
-    /// What the set would cost with it.
-    price: f64,
-}
-
-impl Child<'_> {
-    /// All causes of it.
-    fn causes(&self) -> Vec<Cause> {
-        let mut list = causes(self.set);
-        list.push(self.part.law.cause);
-        list.sort();
-        list
-    }
-
-    /// The price that refining may reach beside sets of so many causes. In the place of a cause that has left, which leaves much, most
-    /// starts gain something: those that lie close show half.
-    fn within_reach(&self, causes: usize) -> f64 {
-        let before = price(self.set);
-        let shown = if self.set.parts.len() < causes { 2.0 * SHOWN_AT_START } else { SHOWN_AT_START };
-        before - (before - self.price).max(LEAST_AT_START) / shown
-    }
-}
-
 /// The sets with each of the most promising causes added, refined jointly: those that are worth it, best first.
 fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit>, Stopped> {
     let Search { bench, laws, watch, .. } = search;
@@ -336,8 +306,7 @@ fn with_one_more(
         *count <= TRIED && child.within_reach(most) < carried_on
     });
     children.sort_by_key(|child| !child.part.law.is_simulated());
-    let fits =
-        watch.each(&children, (half, to), FITTING, |Child { set, part, .. }| refined(bench, set, part.clone()))?;
+    let fits = watch.each(&children, (half, to), FITTING, |child| child.refined(bench))?;
     let (within, strayed): (Vec<_>, Vec<_>) =
         fits.into_iter().zip(&children).partition(|(fit, _)| is_physical(bench, fit));
     let best = within.iter().map(|(fit, _)| fit).chain(others).min_by(|a, b| price(a).total_cmp(&price(b)));
@@ -374,47 +343,6 @@ pub fn refined(bench: &Bench, set: &Fit, part: Part) -> Fit {
     let fit = bench.refine_roughly(bench.fit(parts), count, 6);
     let fit = bench.refine_roughly(fit, 0, if count == 0 { 4 } else { 2 });
     formulation::suited(bench, fit, 2)
-}
-
-/// A law where it explains most of what a set leaves, if that is worth refining; a ripple of few periods beside a fine one.
-/// `much_left` says whether the best of the sets leaves much.
-fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law, much_left: bool) -> Vec<Child<'s>> {
-    let Search { bench, approach, shelf, .. } = search;
-    let shelved = || shelf.get(&law.cause).map_or(&[][..], Vec::as_slice);
-    let fresh: Vec<Part>;
-    let parts: &[Part] = if law.manner.approached {
-        fresh = bench.parts(law, approach.from(shelved(), set).into_iter().collect());
-        &fresh
-    } else if law.manner.starts_from_rest {
-        fresh = bench.parts(law, bench.starts(law, set));
-        &fresh
-    } else {
-        shelved()
-    };
-    let numbers = |part: &Part| NUMBER_PRICE * part.free_parameters() as f64;
-    let figure_with = |part: &Part| figure(&bench.joined(set, part)) + numbers(part);
-    // What resists a simulated table is another with a friction more, and only then shows what that friction is worth.
-    let beside_table = set.table().is_some() || law.is_simulated() && !set.parts.is_empty();
-    let at_one = |part: &Part| {
-        let parts = set.parts.iter().chain([part]).cloned().collect();
-        bench.at_one(bench.fit(parts)).figure() + numbers(part)
-    };
-    let best = |few: bool| {
-        let alike = parts.iter().filter(|part| few_periods(part) == few);
-        let mut start = alike.map(|part| (figure_with(part), part)).min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let least = set.figure() - if few { LEAST_OF_FEW } else { LEAST_AT_START };
-        if beside_table && law.manner.turns_table && much_left {
-            let all = parts.iter().step_by(EVERY).map(|part| (at_one(part), part));
-            start = all.chain([start]).min_by(|a, b| a.0.total_cmp(&b.0))?;
-        } else if beside_table && start.0 < least {
-            start.0 = start.0.min(at_one(start.1));
-        }
-        let (figure, part) = start;
-        (figure < least).then(|| Child { set, part: part.clone(), price: price(set) + figure - set.figure() })
-    };
-    // There is one ripple of few periods at most.
-    let has_few = set.parts.iter().any(|part| part.law.cause == law.cause && few_periods(part));
-    [best(false), if has_few { None } else { best(true) }].into_iter().flatten().collect()
 }
 
 fn may_join(set: &Fit, law: &Law) -> bool {

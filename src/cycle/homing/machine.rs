@@ -263,6 +263,31 @@ impl Homing {
         }
     }
 
+    /// Ends what was granted: the sides catch up, if cycles went by.
+    #[inline(always)]
+    fn end_usual(&mut self) -> bool {
+        self.end_rest();
+        let single = self.sides[0].quick_cycles();
+        if single > 0 {
+            self.now = self.now.saturating_add(single);
+            self.sides[0].profile.position = self.output.target_position_mm[0];
+        }
+        self.sides[0].look_no_further(&self.plan);
+        let went = self.usual.gone() > 0;
+        if went {
+            self.catch_up();
+        }
+        self.usual.end();
+        went
+    }
+
+    fn catch_up(&mut self) {
+        for (i, side) in self.sides.iter_mut().enumerate().take(self.plan.motors) {
+            side.catch_up(&self.plan, &self.usual.caught(i, self.output.target_position_mm[i & 1]));
+        }
+        self.now = self.now.saturating_add(self.usual.gone());
+    }
+
     /// Idle, Done, Failed: follows the axis, and waits for a restore that is still owed.
     #[inline(always)]
     fn rest(&mut self, input: &HomingInput) {

@@ -130,6 +130,12 @@ impl Usual {
         self.granted - self.cruise as u32 - self.slow
     }
 
+    /// Grants no more.
+    #[inline(always)]
+    pub fn end(&mut self) {
+        (self.cruise, self.slow, self.granted) = (0, 0, 0);
+    }
+
     #[inline(always)]
     fn filter(&self, torque: f64x2) -> f64x2 {
         self.filtered * (1.0 - GAIN) + (torque - self.drift)
@@ -263,7 +269,7 @@ impl Usual {
     }
 
     /// What has become of motor `i`, whose command is at `target`.
-    fn caught(&self, i: usize, target: f64) -> Caught {
+    pub fn caught(&self, i: usize, target: f64) -> Caught {
         let of = |lanes: f64x2| lanes.to_array()[i & 1];
         let torque = |lanes: f64x2| of(lanes * self.share + self.middle);
         Caught {
@@ -398,31 +404,6 @@ impl Homing {
         } else {
             self.usual.centre(target - self.usual.speed - self.usual.position, self.usual.position);
         }
-    }
-
-    /// Ends what was granted: the sides catch up, if cycles went by.
-    #[inline(always)]
-    pub(super) fn end_usual(&mut self) -> bool {
-        self.end_rest();
-        let single = self.sides[0].quick_cycles();
-        if single > 0 {
-            self.now = self.now.saturating_add(single);
-            self.sides[0].profile.position = self.output.target_position_mm[0];
-        }
-        self.sides[0].look_no_further(&self.plan);
-        let went = self.usual.gone() > 0;
-        if went {
-            self.catch_up();
-        }
-        (self.usual.cruise, self.usual.slow, self.usual.granted) = (0, 0, 0);
-        went
-    }
-
-    fn catch_up(&mut self) {
-        for (i, side) in self.sides.iter_mut().enumerate().take(self.plan.motors) {
-            side.catch_up(&self.plan, &self.usual.caught(i, self.output.target_position_mm[i & 1]));
-        }
-        self.now = self.now.saturating_add(self.usual.gone());
     }
 
     /// One servo cycle if it is a usual one at constant speed; else [`Homing::quick_both_slow`] must follow.
