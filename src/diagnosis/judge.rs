@@ -14,6 +14,7 @@ use super::gain::{self, Errors, Gain, HeldOut, Replay};
 use super::progress::{Stopped, Watch};
 use super::select::Selection;
 use super::show::{self, Coordinate};
+use super::steady;
 use super::verdict::Verdict;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::physics::LEAST_SLOPE;
@@ -112,18 +113,32 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
                 verdict = still;
             }
         }
-        let gains = self.held_out.gains(self.believed.as_ref(), errors.as_ref());
-        let judged = |errors: &Option<Errors>| errors.as_ref().map(|errors| self.held_out.judged(errors));
-        let in_judged_rows = self.held_out.gains(judged(&self.believed).as_ref(), judged(&errors).as_ref());
-        let effects: Vec<Effect> = found.fit.effects(self.bench.frame).collect();
-        let misleads = verdict == Verdict::PartlyExplained && moves_worse(&in_judged_rows);
-        if !misleads && !refuted(&in_judged_rows, &effects) {
+        let mut weighed = self.weighed(&found.fit, errors.as_ref(), verdict);
+        if let (true, Some(unsteady)) = (weighed.fails, &errors) {
+            if let Some((fit, its)) = steady::damped(self.bench, &self.held_out, (&found.fit, unsteady), self.watch)? {
+                weighed = self.weighed(&fit, Some(&its), verdict);
+                (found.fit, errors) = (fit, Some(its));
+            }
+        }
+        let Weighed { gains, in_judged_rows, fails } = weighed;
+        if !fails {
             let replay = errors.and_then(|errors| errors.replay);
             return Ok(Judged { verdict, selection: found, gains, replay, refutation: None });
         }
         let causes = found.fit.parts.iter().map(|p| p.law.cause);
         let refutation = refutation(causes, &in_judged_rows, "rows that it was not fitted to");
         Ok(Judged { refutation: Some(refutation), ..self.nothing(&found) })
+    }
+
+    /// What held-out rows say of a set of causes by its errors there.
+    fn weighed(&self, fit: &Fit, errors: Option<&Errors>, verdict: Verdict) -> Weighed {
+        let gains = self.held_out.gains(self.believed.as_ref(), errors);
+        let judged = |errors: Option<&Errors>| errors.map(|errors| self.held_out.judged(errors));
+        let in_judged_rows = self.held_out.gains(judged(self.believed.as_ref()).as_ref(), judged(errors).as_ref());
+        let effects: Vec<Effect> = fit.effects(self.bench.frame).collect();
+        let misleads = verdict == Verdict::PartlyExplained && moves_worse(&in_judged_rows);
+        let fails = misleads || refuted(&in_judged_rows, &effects);
+        Weighed { gains, in_judged_rows, fails }
     }
 
     /// Errors of a set on held-out blocks.
@@ -257,6 +272,14 @@ pub fn refutation(causes: impl Iterator<Item = Cause>, gains: &[Gain], rows: &st
         causes.join(" with "),
         ratios.join(", ")
     )
+}
+
+/// What held-out rows say of a set of causes.
+struct Weighed {
+    gains: Vec<Gain>,
+    in_judged_rows: Vec<Gain>,
+    /// Its machine is not to be taken.
+    fails: bool,
 }
 
 /// Variance above the noise floor, a channel each, in units of the floor's variance.

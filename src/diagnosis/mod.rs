@@ -38,6 +38,7 @@ pub mod sampling;
 pub mod select;
 pub mod show;
 mod shrink;
+mod steady;
 pub mod uncertainty;
 mod valleys;
 pub mod verdict;

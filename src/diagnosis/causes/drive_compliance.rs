@@ -66,6 +66,10 @@ pub static LAW: Law = Law {
             let at = less.map(|(less, share)| vec![own * less.sqrt(), share, rubbing * less, DAMPING]);
             at.filter(|shape| shape[1] * shape[2] <= MOST_FRICTION).collect()
         },
+        damped: |shape, more| {
+            let &[own, share, rubbing, damping] = shape else { return None };
+            Some(vec![own, share, rubbing, damping * more])
+        },
         ..PLAIN
     },
     terms: Terms::Simulated(|frame, resistance, shapes| {

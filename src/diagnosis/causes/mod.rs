@@ -98,6 +98,8 @@ pub struct Manner {
     pub restarts: fn(&[f64]) -> Vec<Vec<f64>>,
     /// Where other valleys may be, by the bottom of one.
     pub valleys: fn(&[f64]) -> Vec<Vec<f64>>,
+    /// The same with a swing damped more by a factor; `None` where nothing swings.
+    pub damped: fn(&[f64], f64) -> Option<Vec<f64>>,
     /// Whether the starts depend on what is left.
     pub starts_from_rest: bool,
     /// Whether the sum of squares is so rugged about the right parameters that they are approached from afar.
@@ -110,6 +112,7 @@ pub struct Manner {
 const PLAIN: Manner = Manner {
     restarts: |_| Vec::new(),
     valleys: |_| Vec::new(),
+    damped: |_, _| None,
     starts_from_rest: false,
     approached: false,
     turns_table: false,
