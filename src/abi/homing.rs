@@ -14,12 +14,12 @@ use core::ffi::c_void;
 const ALIVE: u32 = 0x6769_6821;
 /// The same for an instance at work on two motors.
 const BOTH: u32 = 0x6769_6822;
-/// The same for an instance whose motors rest while it works.
+/// The same for an instance that has nothing to do but to follow the axis.
+const QUIET: u32 = 0x6769_6823;
+/// The same for an instance whose motor rests while a touch is evaluated.
 const RESTING: u32 = 0x6769_6824;
 /// The same of two motors.
 const RESTING_BOTH: u32 = 0x6769_6825;
-/// The same for an instance that has nothing to do but to follow the axis.
-const QUIET: u32 = 0x6769_6823;
 
 /// Homing of one axis, of one motor or two. Opaque; its size is `gib_homing_size()`.
 #[repr(C, align(16))]
@@ -47,7 +47,8 @@ impl GibHoming {
     fn mark(&mut self) {
         self.alive = match () {
             () if self.machine.quiet() => QUIET,
-            () if self.machine.rests() => [RESTING, RESTING_BOTH][usize::from(self.machine.gantry())],
+            () if self.machine.rests() && self.machine.gantry() => RESTING_BOTH,
+            () if self.machine.rests() => RESTING,
             () if self.machine.gantry() => BOTH,
             () => ALIVE,
         };

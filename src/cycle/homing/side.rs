@@ -62,9 +62,9 @@ pub struct Side {
     slow: u32,
     low: f64,
     high: f64,
-    /// Of one that rests: the change of the command's speed in those cycles, where it is always the same; cycles in which position and
-    /// torque reading changed last.
+    /// Change of the command's speed in each of them, where that is always the same; else 0.
     rate: f64,
+    /// Of one that rests, the cycles in which position and torque reading changed last.
     moved: u32,
     heard: u32,
     /// Where homing began, mm.

@@ -39,7 +39,7 @@ pub struct Trace {
     length: u32,
     /// Cycles after which a block is full: `length`, or `PAUSED`.
     full: u32,
-    /// Whether every cycle is a block, as most often.
+    /// Whether that is after every cycle. A cycle at constant speed asks this first, in the fewest instructions.
     even: bool,
     in_block: u32,
     position: f64,

@@ -316,6 +316,10 @@ impl Rest {
 impl Homing {
     /// Says for how many cycles more all goes on, at most `left`; after a cycle that was put out.
     pub(super) fn see_usual(&mut self, left: u32) {
+        // What has broken its bound is named in the next cycle, which must not be a usual one.
+        if self.sides.iter().take(self.plan.motors).any(|side| side.filtered.abs() > self.plan.bound) {
+            return;
+        }
         if self.plan.motors == 2 {
             self.see_both(left);
         } else {

@@ -28,7 +28,7 @@ impl Homing {
     #[inline(always)]
     pub(super) fn end_rest(&mut self) {
         if self.at_rest {
-            self.sides.iter_mut().for_each(|side| side.end_rest(self.now));
+            self.sides.iter_mut().take(self.plan.motors).for_each(|side| side.end_rest(self.now));
             self.at_rest = false;
         }
     }
