@@ -200,9 +200,9 @@ impl Fit {
         self.found
     }
 
-    /// Where no contact was found: the slope of the torque in the first quarter of the window, where a dead stop shows its level, and the
-    /// largest that is none: half the pace that would bring it to the limit at the window's end, or chance. `None` where it is no more
-    /// than that.
+    /// Where no contact was found: the slope of the torque in the first quarter of the window before it reaches the threshold, where a dead
+    /// stop shows its level, and the largest that is none: half the pace that would bring it to the limit at the window's end, or chance.
+    /// `None` where it is no more than that.
     #[must_use]
     pub fn rises_early(&self) -> Option<[f64; 2]> {
         let early = &self.early;
