@@ -5,7 +5,7 @@
 use super::causes::Trace;
 use super::causes::periods::{strongest_band, there_alike};
 use super::fit::{Bench, Fit};
-use super::judge::{Excess, LITTLE_LEFT};
+use super::judge::{Excess, LITTLE_LEFT, rms};
 use super::select::{LEAST_GAIN, NUMBER_PRICE};
 use super::show::{self, Coordinate};
 use super::uncertainty::widening;
@@ -23,7 +23,7 @@ const STANDS_OUT: f64 = 10.0;
 /// Share of its variance with which what a band holds may go with where or how fast the axis moves: it gives way to a vibration,
 /// and while it creeps its speed goes with that.
 const TIED: f64 = 0.25;
-/// Share of the excess that may be left beside a vibration alone.
+/// Share of the excess that may be left beside a vibration alone, and that causes must leave of one.
 const MOST_LEFT: f64 = 0.2;
 /// Groups of speed and of position in each of which it must be there.
 const GROUPS: usize = 4;
@@ -42,6 +42,14 @@ pub struct Band {
 }
 
 impl Band {
+    /// Whether what causes leave falls from one root mean square to another without it by a fair share of what it holds: beside a
+    /// table that swings on its spring hardly anything is left of a vibration.
+    #[must_use]
+    pub fn is_taken_off(&self, bench: &Bench, with: f64, without: f64) -> bool {
+        let [before, after] = [&self.before, &self.after].map(|fit| rms(&bench.rest(fit)[0]).powi(2));
+        with.powi(2) - without.powi(2) > MOST_LEFT * (before - after)
+    }
+
     /// What is to be said of this vibration and what was found beside it, by what is said of the latter alone.
     #[must_use]
     pub fn beside(&self, bench: &Bench, verdict: Verdict, found: &Fit) -> Verdict {

@@ -21,7 +21,7 @@ use std::collections::{HashMap, HashSet};
 
 mod starts;
 
-use starts::{Child, at_best_starts};
+use starts::{Child, at_best_starts, at_seldom_starts};
 
 /// Sets that are carried on.
 const BEAM: usize = 2;
@@ -306,7 +306,20 @@ fn with_one_more(
         *count <= TRIED && child.within_reach(most) < carried_on
     });
     children.sort_by_key(|child| !child.part.law.is_simulated());
-    let fits = watch.each(&children, (half, to), FITTING, |child| child.refined(bench))?;
+    let mut fits = watch.each(&children, (half, to), FITTING, |child| child.refined(bench))?;
+    let known = fits.iter().filter(|fit| is_physical(bench, fit)).chain(others);
+    let best = known.min_by(|a, b| price(a).total_cmp(&price(b)));
+    if much_left && best.is_some_and(|best| Excess::of(bench, best, best).largest() > LITTLE_LEFT) {
+        let before = best.map_or(f64::INFINITY, price);
+        let simulated: Vec<_> = open.iter().filter(|(_, law)| law.is_simulated()).collect();
+        let seldom = watch.each(&simulated, (to, to), FITTING, |(set, law)| {
+            let child = at_seldom_starts(bench, set, law).filter(|child| child.within_reach(most) < before)?;
+            Some((child.refined(bench), child))
+        })?;
+        let (more_fits, more): (Vec<_>, Vec<_>) = seldom.into_iter().flatten().unzip();
+        fits.extend(more_fits);
+        children.extend(more);
+    }
     let (within, strayed): (Vec<_>, Vec<_>) =
         fits.into_iter().zip(&children).partition(|(fit, _)| is_physical(bench, fit));
     let best = within.iter().map(|(fit, _)| fit).chain(others).min_by(|a, b| price(a).total_cmp(&price(b)));

@@ -27,6 +27,8 @@ const STEP: f64 = 1.08;
 /// Shares of inertia and friction on the table's side at a start.
 const SHARE: f64 = 0.5;
 const FRICTION_SHARE: f64 = 0.7;
+/// The same of a light table that carries most of the friction, and of a heavy one that carries little.
+const SELDOM: [[f64; 2]; 2] = [[0.25, 0.8], [0.8, 0.4]];
 /// Damping ratio there.
 const DAMPING: f64 = 0.03;
 
@@ -50,6 +52,12 @@ pub static LAW: Law = Law {
         own.map(|own| vec![own, SHARE, FRICTION_SHARE / SHARE, DAMPING]).collect()
     },
     manner: Manner {
+        // When the table rests and turns round depends on its friction for its mass. A light table that carries most of the friction is
+        // hardly seen from a heavy one.
+        seldom: |shape| {
+            let Some(&own) = shape.first() else { return Vec::new() };
+            SELDOM.iter().map(|[share, friction]| vec![own, *share, friction / share, DAMPING]).collect()
+        },
         // How the table swings by itself is found sooner than what is whose: a fit that damps it until it hardly swings has found the one
         // and strayed in the other.
         restarts: |shape| {

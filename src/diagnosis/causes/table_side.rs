@@ -244,6 +244,19 @@ impl<'a, const N: usize> Tables<'a, N> {
         lanes(|l| self.inertia[l] * acceleration + self.share[l] * friction + load)
     }
 
+    /// Torque that the links carry where rows begin: that of a rigid axis, or, of an axis that rests there, what the motor gives as far
+    /// as the friction of the resting table can hold it against the load. Friction that builds up has not yet, and holds nothing.
+    fn carried_first(&self, rows: Range<usize>) -> [f64; N] {
+        let (first, frame) = (rows.start, self.frame);
+        let resting = rows.take_while(|i| frame.direction[*i] == 0.0).map(|i| frame.columns.torque[i]);
+        let (count, sum) = resting.fold((0.0, 0.0), |(count, sum), torque| (count + 1.0, sum + torque));
+        if count == 0.0 || self.bristle.is_some() {
+            return self.carried(first);
+        }
+        let Resisting { load, friction, .. } = self.resisting_tables(first);
+        lanes(|l| larger(smaller(sum / count, load[l] + friction[l]), load[l] - friction[l]))
+    }
+
     /// What the link of a rigid axis carries between a row and the next, shared between them by how near it acts: the
     /// triangular mean of the acceleration is a second difference, that of friction is taken as the base takes it.
     #[inline(always)]

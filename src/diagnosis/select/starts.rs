@@ -73,7 +73,6 @@ pub fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law, much
     } else {
         shelved()
     };
-    let numbers = |part: &Part| NUMBER_PRICE * part.free_parameters() as f64;
     let figures: Vec<f64> = parts.iter().map(|part| figure(&bench.joined(set, part)) + numbers(part)).collect();
     // What resists a simulated table is another with a friction more, and only then shows what that friction is worth.
     let beside_table = set.table().is_some() || law.is_simulated() && !set.parts.is_empty();
@@ -106,6 +105,26 @@ pub fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law, much
     // There is one ripple of few periods at most.
     let has_few = set.parts.iter().any(|part| part.law.cause == law.cause && few_periods(part));
     [best(false), if has_few { None } else { best(true) }].into_iter().flatten().collect()
+}
+
+/// What the numbers of a cause cost.
+fn numbers(part: &Part) -> f64 {
+    NUMBER_PRICE * part.free_parameters() as f64
+}
+
+/// A law at the best of its seldom starts beside a set, if that is worth refining.
+#[must_use]
+pub fn at_seldom_starts<'s>(bench: &Bench, set: &'s Fit, law: &'static Law) -> Option<Child<'s>> {
+    let seldom = bench.starts(law, set).iter().flat_map(|shape| (law.manner.seldom)(shape)).collect();
+    let parts = bench.parts(law, seldom);
+    let rated = parts.iter().map(|part| figure(&bench.joined(set, part)) + numbers(part));
+    let (figure, part) = rated.zip(&parts).min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (figure < set.figure() - LEAST_AT_START).then(|| Child {
+        set,
+        part: part.clone(),
+        price: price(set) + figure - set.figure(),
+        elsewhere: None,
+    })
 }
 
 /// The deepest of the valleys beside that of the best start, of starts in a row and what each would leave of a figure: one that shows

@@ -132,7 +132,7 @@ impl<const N: usize> Tables<'_, N> {
         let unit = self.frame.unit;
         let per_step = 1.0 / self.steps as f64;
         // Seen from the motor.
-        let mut x = self.carried(rows.start);
+        let mut x = self.carried_first(rows.clone());
         for l in 0..N {
             x[l] = -x[l] / self.stiffness[l];
         }
