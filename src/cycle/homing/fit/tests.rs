@@ -2,13 +2,15 @@ use super::*;
 use proptest::prelude::*;
 
 const WINDOW: f64 = 0.6;
+/// Way of a cycle, mm.
+const STEP: f64 = 0.0005;
 
 /// A clean touch: level, line with stiffness `k` from `corner` on, cut off at `limit`.
 fn touch(level: f64, k: f64, corner: f64, limit: f64, noise: impl Fn(u32) -> f64) -> Trace {
     let mut trace = Trace::default();
     trace.start(1, 0.0, 1.0, 1.0);
     for i in 0..1500 {
-        let way = 0.0005 * f64::from(i);
+        let way = STEP * f64::from(i);
         let torque = (level + k * (way - corner).max(0.0)).min(limit);
         trace.add(way, torque + noise(i));
         if torque >= limit {
@@ -34,10 +36,19 @@ fn fitted(trace: &Trace, threshold: f64) -> Option<Contact> {
 }
 
 proptest! {
-    /// Without noise the corner is found whatever level, stiffness and limit are.
+    /// Without noise the corner is found whatever level, stiffness and limit are; refused is only a line of too few blocks.
     #[test]
     fn corner_of_a_clean_touch(level in -2.0..3.0f64, k in 20.0..300.0f64, corner in 0.2..0.4f64, limit in 4.5..9.0f64) {
-        let contact = fitted(&touch(level, k, corner, limit, |_| 0.0), 0.9 * limit).unwrap();
+        let threshold = 0.9 * limit;
+        let used = (LINE_TO - LINE_FROM) * (threshold - level) / k / STEP;
+        let contact = match evaluated(&touch(level, k, corner, limit, |_| 0.0), 0.1, threshold).found() {
+            Ok(contact) => contact,
+            Err(fault) => {
+                prop_assert!(fault.field == "blocks\0" && used < FEWEST + 1.0, "{fault:?}: {used} blocks");
+                return Ok(());
+            }
+        };
+        prop_assert!(used > FEWEST - 1.0, "{used} blocks");
         prop_assert!((contact.way - corner).abs() < 2e-5, "{} of {corner}", contact.way);
         prop_assert!((contact.stiffness / k - 1.0).abs() < 1e-3 && (contact.level - level).abs() < 1e-4);
     }
