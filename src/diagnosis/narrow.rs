@@ -23,8 +23,11 @@ const STANDS_OUT: f64 = 10.0;
 /// Share of its variance with which what a band holds may go with where or how fast the axis moves: it gives way to a vibration,
 /// and while it creeps its speed goes with that.
 const TIED: f64 = 0.25;
-/// Share of the excess that may be left beside a vibration alone, and that causes must leave of one.
+/// Share of the excess that may be left beside a vibration alone.
 const MOST_LEFT: f64 = 0.2;
+/// Share of the squares that a band holds which causes found without it must leave of it. Where the spring of a swinging table was among
+/// them, less than a thousandth was left of the swing.
+const LEAST_LEFT: f64 = 0.1;
 /// Groups of speed and of position in each of which it must be there.
 const GROUPS: usize = 4;
 
@@ -42,12 +45,12 @@ pub struct Band {
 }
 
 impl Band {
-    /// Whether what causes leave falls from one root mean square to another without it by a fair share of what it holds: beside a
-    /// table that swings on its spring hardly anything is left of a vibration.
+    /// Whether causes that were found without this vibration leave it, by the root mean square of what they leave and of what those found
+    /// beside it do: what they take off as well is none.
     #[must_use]
-    pub fn is_taken_off(&self, bench: &Bench, with: f64, without: f64) -> bool {
+    pub fn is_left_by_others(&self, bench: &Bench, without_it: f64, beside_it: f64) -> bool {
         let [before, after] = [&self.before, &self.after].map(|fit| rms(&bench.rest(fit)[0]).powi(2));
-        with.powi(2) - without.powi(2) > MOST_LEFT * (before - after)
+        without_it.powi(2) - beside_it.powi(2) > LEAST_LEFT * (before - after)
     }
 
     /// What is to be said of this vibration and what was found beside it, by what is said of the latter alone.

@@ -262,11 +262,15 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
     Ok(grown)
 }
 
-/// Whether the best of some sets leaves much. Where it leaves little no other comes before it by much, and tables need not be turned
-/// round for that.
-fn much_left<'s>(bench: &Bench, sets: impl Iterator<Item = &'s Fit>) -> bool {
-    let best = sets.min_by(|a, b| price(a).total_cmp(&price(b)));
-    best.is_some_and(|best| Excess::of(bench, best, best).largest() > LITTLE_LEFT)
+/// The set that costs least.
+fn cheapest<'s>(sets: impl Iterator<Item = &'s Fit>) -> Option<&'s Fit> {
+    sets.min_by(|a, b| price(a).total_cmp(&price(b)))
+}
+
+/// Whether a set leaves much. Where the best leaves little no other comes before it by much, and tables need not be turned round for
+/// that.
+fn leaves_much(bench: &Bench, set: &Fit) -> bool {
+    Excess::of(bench, set, set).largest() > LITTLE_LEFT
 }
 
 /// A set without what turns a table round, where it has that and no table.
@@ -286,7 +290,7 @@ fn with_one_more(
 ) -> Result<Vec<Fit>, Stopped> {
     let Search { bench, watch, .. } = search;
     let half = 0.5 * (from + to);
-    let much_left = much_left(bench, open.iter().map(|(set, _)| *set));
+    let much_left = cheapest(open.iter().map(|(set, _)| *set)).is_some_and(|best| leaves_much(bench, best));
     let look = |&(set, law): &(_, _)| at_best_starts(search, set, law, much_left);
     let mut children: Vec<Child> =
         watch.each(open, (from, half), "looking for causes", look)?.into_iter().flatten().collect();
@@ -307,22 +311,22 @@ fn with_one_more(
     });
     children.sort_by_key(|child| !child.part.law.is_simulated());
     let mut fits = watch.each(&children, (half, to), FITTING, |child| child.refined(bench))?;
-    let known = fits.iter().filter(|fit| is_physical(bench, fit)).chain(others);
-    let best = known.min_by(|a, b| price(a).total_cmp(&price(b)));
-    if much_left && best.is_some_and(|best| Excess::of(bench, best, best).largest() > LITTLE_LEFT) {
-        let before = best.map_or(f64::INFINITY, price);
-        let simulated: Vec<_> = open.iter().filter(|(_, law)| law.is_simulated()).collect();
-        let seldom = watch.each(&simulated, (to, to), FITTING, |(set, law)| {
+    let sound = fits.iter().filter(|fit| is_physical(bench, fit));
+    let best = cheapest(sound.chain(others).chain(open.iter().map(|(set, _)| *set)));
+    if let Some(best) = best.filter(|best| leaves_much(bench, best)) {
+        let rare: Vec<_> = open.iter().filter(|(_, law)| law.manner.seldom.is_some()).collect();
+        let before = price(best);
+        let begun = watch.each(&rare, (to, to), FITTING, |(set, law)| {
             let child = at_seldom_starts(bench, set, law).filter(|child| child.within_reach(most) < before)?;
             Some((child.refined(bench), child))
         })?;
-        let (more_fits, more): (Vec<_>, Vec<_>) = seldom.into_iter().flatten().unzip();
+        let (more_fits, more): (Vec<_>, Vec<_>) = begun.into_iter().flatten().unzip();
         fits.extend(more_fits);
         children.extend(more);
     }
     let (within, strayed): (Vec<_>, Vec<_>) =
         fits.into_iter().zip(&children).partition(|(fit, _)| is_physical(bench, fit));
-    let best = within.iter().map(|(fit, _)| fit).chain(others).min_by(|a, b| price(a).total_cmp(&price(b)));
+    let best = cheapest(within.iter().map(|(fit, _)| fit).chain(others));
     let right = watch.each(&strayed, (to, to), FITTING, |(fit, child)| {
         let right = if astray::matters(fit, best) { astray::put_right(bench, child.set, fit) } else { None };
         right.filter(|fit| is_physical(bench, fit))

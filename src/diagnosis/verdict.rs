@@ -178,7 +178,8 @@ fn answer(recorded: &Recorded, frame: &Frame, notes: Vec<String>) -> Result<Diag
         let beside = bench.beside_lines(&band.columns);
         let again = answer_on(recorded, &beside, Some(&band), notes)?;
         let named = matches!(again.verdict, Verdict::Explained | Verdict::PartlyExplained);
-        if named && band.is_taken_off(&bench, found.unexplained.torque.rms, again.unexplained.torque.rms) {
+        let [without_it, beside_it] = [&found, &again].map(|answer| answer.unexplained.torque.rms);
+        if named && band.is_left_by_others(&bench, without_it, beside_it) {
             return Ok(again);
         }
     }

@@ -54,10 +54,10 @@ pub static LAW: Law = Law {
     manner: Manner {
         // When the table rests and turns round depends on its friction for its mass. A light table that carries most of the friction is
         // hardly seen from a heavy one.
-        seldom: |shape| {
+        seldom: Some(|shape| {
             let Some(&own) = shape.first() else { return Vec::new() };
             SELDOM.iter().map(|[share, friction]| vec![own, *share, friction / share, DAMPING]).collect()
-        },
+        }),
         // How the table swings by itself is found sooner than what is whose: a fit that damps it until it hardly swings has found the one
         // and strayed in the other.
         restarts: |shape| {

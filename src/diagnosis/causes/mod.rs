@@ -94,8 +94,8 @@ pub struct Rest<'a> {
 
 /// How a law is looked for.
 pub struct Manner {
-    /// Starts beside one, with parameters that few machines have: for where no other start shows what is left.
-    pub seldom: fn(&[f64]) -> Vec<Vec<f64>>,
+    /// Starts beside one, with parameters that few machines have, for where all causes leave much; `None` where there are none.
+    pub seldom: Option<fn(&[f64]) -> Vec<Vec<f64>>>,
     /// Starts anew from where a fit has strayed beyond the bounds, by what it has found all the same.
     pub restarts: fn(&[f64]) -> Vec<Vec<f64>>,
     /// Where other valleys may be, by the bottom of one.
@@ -112,7 +112,7 @@ pub struct Manner {
 
 /// That of a law that does not stray, with a trace that is worked out row by row, from starts that the recording gives.
 const PLAIN: Manner = Manner {
-    seldom: |_| Vec::new(),
+    seldom: None,
     restarts: |_| Vec::new(),
     valleys: |_| Vec::new(),
     damped: |_, _| None,

@@ -27,14 +27,18 @@ pub struct Child<'s> {
     elsewhere: Option<Part>,
 }
 
-impl Child<'_> {
+impl<'s> Child<'s> {
+    /// A cause beside a set, whose figure it brings to another.
+    fn new(set: &'s Fit, part: &Part, figure: f64, elsewhere: Option<Part>) -> Self {
+        Self { set, part: part.clone(), price: price(set) + figure - set.figure(), elsewhere }
+    }
+
     /// The set with it, from its best start, and from one in another valley if that leaves much.
     #[must_use]
     pub fn refined(&self, bench: &Bench) -> Fit {
         let from = |part: &Part| refined(bench, self.set, part.clone());
         let fit = from(&self.part);
-        let much_left = Excess::of(bench, &fit, &fit).largest() > LITTLE_LEFT;
-        let other = self.elsewhere.as_ref().filter(|_| much_left).map(from);
+        let other = self.elsewhere.as_ref().filter(|_| leaves_much(bench, &fit)).map(from);
         other.filter(|other| price(other) < price(&fit) && is_physical(bench, other)).unwrap_or(fit)
     }
 
@@ -95,12 +99,7 @@ pub fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law, much
         let in_a_row = law.is_simulated() && !law.manner.approached;
         let other = if in_a_row { other_valley(&figures, set.figure()) } else { None };
         let elsewhere = other.map(|i| parts[i].clone());
-        (figure < least).then(|| Child {
-            set,
-            part: part.clone(),
-            price: price(set) + figure - set.figure(),
-            elsewhere,
-        })
+        (figure < least).then(|| Child::new(set, part, figure, elsewhere))
     };
     // There is one ripple of few periods at most.
     let has_few = set.parts.iter().any(|part| part.law.cause == law.cause && few_periods(part));
@@ -115,16 +114,11 @@ fn numbers(part: &Part) -> f64 {
 /// A law at the best of its seldom starts beside a set, if that is worth refining.
 #[must_use]
 pub fn at_seldom_starts<'s>(bench: &Bench, set: &'s Fit, law: &'static Law) -> Option<Child<'s>> {
-    let seldom = bench.starts(law, set).iter().flat_map(|shape| (law.manner.seldom)(shape)).collect();
-    let parts = bench.parts(law, seldom);
-    let rated = parts.iter().map(|part| figure(&bench.joined(set, part)) + numbers(part));
-    let (figure, part) = rated.zip(&parts).min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (figure < set.figure() - LEAST_AT_START).then(|| Child {
-        set,
-        part: part.clone(),
-        price: price(set) + figure - set.figure(),
-        elsewhere: None,
-    })
+    let seldom = law.manner.seldom?;
+    let parts = bench.parts(law, bench.starts(law, set).iter().flat_map(|shape| seldom(shape)).collect());
+    let rated = parts.iter().map(|part| (figure(&bench.joined(set, part)) + numbers(part), part));
+    let (figure, part) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (figure < set.figure() - LEAST_AT_START).then(|| Child::new(set, part, figure, None))
 }
 
 /// The deepest of the valleys beside that of the best start, of starts in a row and what each would leave of a figure: one that shows
