@@ -3,7 +3,7 @@
 //! displacement is worth depends on it. The search knows one bristle and one spread of elements; here the exponents are refined, and
 //! another formulation than the plain bristle is taken where it is known to be better.
 
-use super::causes::presliding_friction::{BRISTLE, ELEMENTS, OF_ANY_EXPONENT};
+use super::causes::presliding_friction::{BRISTLE, ELEMENTS, ELEMENTS_AS_BRISTLE, OF_ANY_EXPONENT};
 use super::causes::{Law, law};
 use super::fit::{Bench, Fit, Part};
 use super::progress::{Stopped, Watch};
@@ -61,29 +61,36 @@ pub fn settled(bench: &Bench, found: Selection, watch: &Watch) -> Result<Selecti
     let mut parts = found.fit.parts.clone();
     let sought = parts.remove(at);
     let (last, stiffness) = (parts.len(), sought.shape[0]);
-    let with = |law: &'static Law, kind: [f64; 2]| {
-        let shape = vec![stiffness, kind[0], kind[1]];
+    let with = |law: &'static Law, [exponent, kind]: [f64; 2], stiffness: f64| {
+        let shape = vec![stiffness, exponent, kind];
         let own = bench.parts(law, vec![shape]);
         bench.refine_roughly(bench.fit(parts.iter().cloned().chain(own).collect()), last, OWN_STEPS)
     };
     let is_plain = sought.shape[1..] == BRISTLE;
     let any = &OF_ANY_EXPONENT;
-    let kinds = [(any, BRISTLE), (any, ELEMENTS), (law(Cause::PreslidingFriction), BRISTLE)];
-    let tried = &kinds[..if is_plain { 2 } else { 3 }];
-    let mut fits = watch.each(tried, (0.9, 0.9), STAGE, |&(law, kind)| with(law, kind))?;
+    let plain_law = law(Cause::PreslidingFriction);
+    let kinds = [
+        (any, BRISTLE, stiffness),
+        (any, ELEMENTS, stiffness),
+        (any, ELEMENTS_AS_BRISTLE, 0.5 * stiffness),
+        (plain_law, BRISTLE, stiffness),
+    ];
+    // Elements that were found have gone from their start as far as they would.
+    let tried = if is_plain { &kinds[..3] } else { &[kinds[0], kinds[1], kinds[3]] };
+    let mut fits = watch.each(tried, (0.9, 0.9), STAGE, |&(law, kind, stiffness)| with(law, kind, stiffness))?;
     let plain = if is_plain { found.fit.clone() } else { fits.remove(2) };
     fits.sort_by(|a, b| a.squares().total_cmp(&b.squares()));
+    fits.truncate(2);
     let Ok([best, other]) = <[Fit; 2]>::try_from(fits) else { return Ok(found) };
     // Beside what only stands in for it an exponent is not sure before all are refined.
     let much_less = price(&best) < price(&plain) - MUCH;
-    if much_less || price(&best) < price(&plain) && is_surely_another(bench, &best, last) {
+    if much_less || price(&best) < price(&plain) && is_surely_another(bench, &best, &plain) {
         let alike = other.squares() <= WITHIN_REACH * best.squares();
         let near: Vec<Fit> = std::iter::once(best).chain(alike.then_some(other)).collect();
         let refined = |fit: &Fit| sound(bench, bench.refine(fit.clone(), 0, STEPS));
         let mut fits: Vec<Fit> = watch.each(&near, (0.9, 0.9), STAGE, refined)?.into_iter().flatten().collect();
         fits.sort_by(|a, b| a.squares().total_cmp(&b.squares()));
-        let is_another = |fit: &Fit| place(fit).is_some_and(|at| is_surely_another(bench, fit, at));
-        if fits.first().is_some_and(|fit| price(fit) < price(&plain) && is_another(fit)) {
+        if fits.first().is_some_and(|fit| price(fit) < price(&plain) && is_surely_another(bench, fit, &plain)) {
             let fit = fits.remove(0);
             fits.retain(|other| block_t(bench, other, &fit) < ALIKE);
             return without_substitutes(bench, Selection { fit, alike: fits, ..found }, watch);
@@ -129,12 +136,15 @@ fn without_substitutes(bench: &Bench, found: Selection, watch: &Watch) -> Result
     Ok(Selection { fit, alike, rivals: found.rivals })
 }
 
-/// Whether the exponent is surely not that of the plain bristle. Elements of this exponent go the same way after a full reversal.
-fn is_surely_another(bench: &Bench, fit: &Fit, at: usize) -> bool {
-    match uncertainty::effects(bench, fit, None).swap_remove(at) {
+/// Whether friction surely builds up in another way than by the plain bristle: by its exponent or, since elements of the same
+/// exponent differ from a bristle only before they have all slipped, by what it leaves less in the blocks.
+fn is_surely_another(bench: &Bench, fit: &Fit, plain: &Fit) -> bool {
+    let Some(at) = place(fit) else { return false };
+    let by_exponent = match uncertainty::effects(bench, fit, None).swap_remove(at) {
         Some((Effect::PreslidingFriction { exponent, .. }, deviations)) => {
             (exponent - BRISTLE[0]).abs() > LEAST_STRENGTH * deviations[1]
         }
         _ => false,
-    }
+    };
+    by_exponent || fit.parts[at].shape[2..] == ELEMENTS[1..] && block_t(bench, plain, fit) > LEAST_STRENGTH
 }

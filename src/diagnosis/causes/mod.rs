@@ -92,14 +92,17 @@ pub struct Rest<'a> {
     pub table: &'a [f64],
 }
 
+/// Starts by the parameters of one.
+type Others = fn(&[f64]) -> Vec<Vec<f64>>;
+
 /// How a law is looked for.
 pub struct Manner {
     /// Starts beside one, with parameters that few machines have, for where all causes leave much; `None` where there are none.
-    pub seldom: Option<fn(&[f64]) -> Vec<Vec<f64>>>,
+    pub seldom: Option<Others>,
     /// Starts anew from where a fit has strayed beyond the bounds, by what it has found all the same.
-    pub restarts: fn(&[f64]) -> Vec<Vec<f64>>,
+    pub restarts: Others,
     /// Where other valleys may be, by the bottom of one.
-    pub valleys: fn(&[f64]) -> Vec<Vec<f64>>,
+    pub valleys: Others,
     /// The same with a swing damped more by a factor; `None` where nothing swings.
     pub damped: fn(&[f64], f64) -> Option<Vec<f64>>,
     /// Whether the starts depend on what is left.

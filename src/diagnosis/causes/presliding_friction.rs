@@ -18,6 +18,8 @@ const DISPLACEMENT: Scale = Scale::Log(0.05, 2000.0);
 /// What the search knows: n, and 0 for a bristle or 1 for elements.
 pub const BRISTLE: [f64; 2] = [1.0, 0.0];
 pub const ELEMENTS: [f64; 2] = [0.4, 1.0];
+/// Elements that go as a bristle of twice their displacement once all have slipped.
+pub const ELEMENTS_AS_BRISTLE: [f64; 2] = [1.0, 1.0];
 
 const fn with_exponent(scales: &'static [Scale]) -> Law {
     Law {
