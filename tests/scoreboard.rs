@@ -186,6 +186,16 @@ fn springs_are_named_whatever_the_table_and_however_it_began() {
     assert!((0.9..1.1).contains(&residual), "{residual}");
 }
 
+/// Friction that builds up over a few steps of the encoder shows only where the axis seems to rest.
+#[test]
+fn friction_that_yields_over_a_micrometre_is_seen_where_the_axis_creeps() {
+    let yields = Kind::One("presliding_friction");
+    let summary = summarise(&all_diagnosed(&[(8118, 22, yields), (8118, 32, yields), (8118, 33, yields)], 40.0, false));
+    assert_eq!((summary.failures, summary.first_right, summary.wrong_beside), (0, (3, 3), (0, 3)));
+    let residual = summary.against_truth.unwrap();
+    assert!((0.9..1.1).contains(&residual), "{residual}");
+}
+
 /// Encoder noise, friction of other formulations and pulses on the torque are no faults, and hide none.
 #[test]
 fn rough_rigs_raise_no_alarm() {

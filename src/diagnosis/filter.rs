@@ -15,6 +15,17 @@ pub struct LowPass {
 }
 
 impl LowPass {
+    /// Of the least width at which the noise of second differences, seen through the inertia, is no louder than the torque's own: a
+    /// wider filter would be quieter and hide what is fast, a narrower one would bias the inertia.
+    #[must_use]
+    pub fn fitting(bend_noise: f64, torque_noise: f64) -> Self {
+        let quiet = |filter: &Self| {
+            let kernel = filter.kernel();
+            bend_noise * norm(&convolve(&kernel, &[1.0, -2.0, 1.0])) <= torque_noise * norm(&kernel)
+        };
+        (1..40).map(|half| Self { width: 2 * half + 1 }).find(quiet).unwrap_or(Self { width: 81 })
+    }
+
     /// Rows on each side that a filtered row depends on.
     #[must_use]
     pub fn reach(self) -> usize {

@@ -90,6 +90,8 @@ pub struct Frame<'a> {
     pub direction: Vec<f64>,
     /// The encoder's grid, load units.
     pub grid: f64,
+    /// The least way that the encoder tells for sure, load units.
+    pub resolution: f64,
     /// How the torque column was sampled.
     pub sampling: Sampling,
     /// Its timing by a delay.
@@ -124,6 +126,13 @@ impl<'a> Frame<'a> {
     /// Prepares columns for an axis; `width` of the filter is chosen from noise and grid unless given.
     #[must_use]
     pub fn new(axis: &'a Axis, columns: &'a Columns, width: Option<usize>) -> Self {
+        Self::yielding_over(axis, columns, width, 0.0)
+    }
+
+    /// The same where friction builds up over a way (load units): an axis that seems to rest has the friction of where it is, as far as
+    /// the encoder tells that.
+    #[must_use]
+    pub fn yielding_over(axis: &'a Axis, columns: &'a Columns, width: Option<usize>, way: f64) -> Self {
         let belief = axis.belief();
         let unit = axis.drive.motor_per_load();
         let stretches = &columns.stretches;
@@ -135,9 +144,8 @@ impl<'a> Frame<'a> {
         let torque_grid = crate::analysis::statistics::grid(&columns.torque).unwrap_or(0.0).max(columns.torque_step);
         let scatter_of_torque = crate::analysis::statistics::white_noise(&columns.torque).unwrap_or(0.0);
         let torque_noise = scatter_of_torque.max(torque_grid / 12f64.sqrt());
-        let low_pass = LowPass {
-            width: width.unwrap_or_else(|| fit_width(position_noise * unit * belief.inertia / (h * h), torque_noise)),
-        };
+        let bend_noise = position_noise * unit * belief.inertia / (h * h);
+        let low_pass = width.map_or_else(|| LowPass::fitting(bend_noise, torque_noise), |width| LowPass { width });
         let speed = |x: &[f64], i: usize| (x[i + 1] - x[i - 1]) / (2.0 * h);
         let central = map_rows(columns, &columns.position, speed);
         let bend = map_rows(columns, &columns.position, |x, i| (x[i + 1] - 2.0 * x[i] + x[i - 1]) / (h * h));
@@ -158,6 +166,8 @@ impl<'a> Frame<'a> {
         let mut doubt = doubtful_rows(columns, resting, resolution);
         let creeping = CREEPING * v.iter().fold(0.0f64, |m, v| m.max(v.abs())).max(1e-300);
         doubt.iter_mut().zip(&v).for_each(|(doubt, v)| *doubt = doubt.max((-(v / creeping).powi(2)).exp()));
+        let unseen = if way > 0.0 { (resolution / way).min(1.0) } else { 1.0 };
+        doubt.iter_mut().for_each(|doubt| *doubt = doubt.min(unseen));
         let doubt = low_pass.run(&doubt, stretches);
         let level = belief.coulomb.max(1e-3 * typical(&columns.torque)) / torque_noise.max(1e-300);
         let kernel_norm = norm(&low_pass_kernel);
@@ -203,6 +213,7 @@ impl<'a> Frame<'a> {
             speed,
             torque,
             stroke: columns.position.iter().fold((f64::MAX, f64::MIN), |(lo, hi), x| (x.min(lo), x.max(hi))),
+            resolution,
             unseen: 0.0,
             grids_in_table: 0.0,
             kernel,
@@ -472,18 +483,6 @@ fn map_rows(columns: &Columns, x: &[f64], rule: impl Fn(&[f64], usize) -> f64) -
         out[s.end - 1] = out[s.end - 2];
     }
     out
-}
-
-/// Least width at which the encoder's grid, seen through the inertia, is no louder than the torque's own noise: a
-/// wider filter would be quieter and hide what is fast, a narrower one would bias the inertia.
-fn fit_width(bend_noise: f64, torque_noise: f64) -> usize {
-    for half in 1..40 {
-        let kernel = LowPass { width: 2 * half + 1 }.kernel();
-        if bend_noise * norm(&convolve(&kernel, &[1.0, -2.0, 1.0])) <= torque_noise * norm(&kernel) {
-            return 2 * half + 1;
-        }
-    }
-    81
 }
 
 /// Root mean square.

@@ -15,6 +15,7 @@ pub mod causes;
 mod choice;
 mod columns;
 mod contact;
+mod creep;
 mod excerpt;
 pub mod experiment;
 pub mod filter;

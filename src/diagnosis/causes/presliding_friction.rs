@@ -60,8 +60,18 @@ const fn with_exponent(scales: &'static [Scale]) -> Law {
     }
 }
 
+/// What counts as all of the level.
+const ALL: f64 = 1.0 - 1e-12;
+
 fn is_of_elements(kind: f64) -> bool {
     kind > 0.5
+}
+
+/// The state −1…1 of a bristle at every row that yields over so many load units.
+#[must_use]
+pub fn bristle_over(frame: &Frame, displacement: f64) -> Vec<f64> {
+    let [state, _] = build_up(frame, displacement, BRISTLE[0], false);
+    state
 }
 
 /// The state −1…1 at every row, solved exactly over each step, and its change per second; unknown at the start and taken as zero.
@@ -82,7 +92,7 @@ fn build_up(frame: &Frame, displacement: f64, exponent: f64, of_elements: bool) 
                     let (mut z, mut elements) = (0.0, elements);
                     for (state, step) in states {
                         // Where all of them slip they go on slipping.
-                        z = if z * step.signum() >= 1.0 { z } else { elements.moved(step, 1.0) };
+                        z = if z * step.signum() >= ALL { z } else { elements.moved(step, 1.0) };
                         *state = z;
                     }
                 },
