@@ -29,16 +29,10 @@ const LEVELS: [f64; 2] = [0.6, 1.6];
 #[must_use]
 pub fn way(frame: &Frame) -> Option<f64> {
     let (belief, unit) = (&frame.belief, frame.unit);
-    let low_passed = |values: &[f64]| frame.low_pass.run(values, &frame.columns.stretches);
-    let torque = low_passed(&frame.columns.torque);
-    let friction: Vec<f64> = (0..torque.len())
-        .map(|i| torque[i] - (belief.inertia * frame.a[i] + belief.viscous * frame.v[i]) * unit - belief.constant)
-        .collect();
-    let judged = {
-        let mut judged = vec![false; torque.len()];
-        frame.kept.iter().for_each(|&row| judged[row] = true);
-        judged
-    };
+    let moving = |i: usize| (belief.inertia * frame.a[i] + belief.viscous * frame.v[i]) * unit + belief.constant;
+    let friction: Vec<f64> = frame.torque.iter().enumerate().map(|(i, torque)| torque - moving(i)).collect();
+    let mut judged = vec![false; friction.len()];
+    frame.kept.iter().for_each(|&row| judged[row] = true);
     let count = ((WAYS[1] / WAYS[0]).ln() / RATIO.ln()).ceil() as i32;
     let ways: Vec<f64> = (0..=count).map(|k| frame.resolution * WAYS[0] * RATIO.powi(k)).collect();
     let shares = ways.iter().map(|way| share(frame, *way, &friction, &judged).unwrap_or(0.0));
@@ -49,8 +43,8 @@ pub fn way(frame: &Frame) -> Option<f64> {
 
 /// Whether among effects friction builds up over about that way: elements over half of it go as a bristle.
 #[must_use]
-pub fn is_over(way: f64, effects: &[Effect]) -> bool {
-    effects.iter().any(|effect| match effect {
+pub fn is_over(way: f64, mut effects: impl Iterator<Item = Effect>) -> bool {
+    effects.any(|effect| match effect {
         Effect::PreslidingFriction { displacement_um, .. } => {
             (1.0 / ABOUT..ABOUT).contains(&(displacement_um * 1e-3 / way))
         }

@@ -109,7 +109,7 @@ pub struct Frame<'a> {
     /// Speed, motor units, at the kept rows.
     pub speed: Vec<f64>,
     /// Filtered torque of every row, not aligned.
-    torque: Vec<f64>,
+    pub torque: Vec<f64>,
     stroke: (f64, f64),
     /// What the encoder's grid makes in the balance beyond what [`Frame::floor`] sees in second differences, drive's own unit.
     pub unseen: f64,

@@ -151,7 +151,7 @@ pub fn diagnose(
         if let Some(way) = creep::way(&frame) {
             let frame = without_swings(Frame::yielding_over(&base, &columns, None, way));
             let again = answer(&recorded, &frame, notes)?;
-            if creep::is_over(way, &again.findings.iter().map(|f| f.effect).collect::<Vec<_>>()) {
+            if creep::is_over(way, again.findings.iter().map(|finding| finding.effect)) {
                 return Ok(again);
             }
         }

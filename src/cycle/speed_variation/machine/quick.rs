@@ -59,8 +59,7 @@ impl SpeedVariation {
     }
 
     /// Cycles in which a triangle goes on at its rate, neither turned at a corner nor held by the motor; one of them is kept
-    /// back for rounding. None under a heavier load than that for which it was worked out what the motor
-    /// has enough for.
+    /// back for rounding. None under a heavier load than that for which it was worked out what the motor has enough for.
     fn slope_left(&self, change: f64) -> i32 {
         let Setting { corners: [low, high], free: [rise, brake], rate, asked: [.., cutting], .. } = self.now;
         // In the sense it goes on in: a corner met exactly has turned it, though the change was still the old one.
