@@ -310,6 +310,24 @@ fn a_load_that_grows_anywhere_on_a_slope_is_counted_at_once() {
     }
 }
 
+/// On the way back from an infinite amplitude, which stays, a load that goes and comes again is counted at once.
+#[test]
+fn a_load_that_comes_back_beside_a_wrong_input_is_counted_at_once() {
+    let config = SpeedVariationConfig { torque_nm: 120.0, ..config() };
+    let mut machine = started(&config);
+    for _ in 0..1800 {
+        machine.step(&asked(1000.0));
+    }
+    let mut last = rad_s_from_rpm(machine.output().speed_command_rpm);
+    assert!(last < rad_s_from_rpm(900.0), "the way back is upward");
+    for cutting_nm in [[90.0; 5], [0.0; 5], [90.0; 5]].concat() {
+        let input = SpeedVariationInput { amplitude_ratio: f64::INFINITY, cutting_nm, ..asked(1000.0) };
+        let omega = rad_s_from_rpm(machine.step(&input).speed_command_rpm);
+        within_the_motor(&config, omega, omega - last, cutting_nm).unwrap();
+        last = omega;
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     /// Amplitude, period, speed and cutting torque change at random cycles: torque, power and speed stay within

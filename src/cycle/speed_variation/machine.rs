@@ -46,6 +46,9 @@ pub const WORKED_OUT: u32 = 20;
 #[repr(align(16))]
 struct Pair([f64; 2]);
 
+/// What no input is the same as.
+const NOTHING_SEEN: [Pair; 2] = [Pair([f64::NAN; 2]); 2];
+
 /// A speed variation of one spindle: plain data, no pointers. Speeds in rad/s, positive in the sense of rotation.
 #[derive(Debug, Clone, Copy)]
 pub struct SpeedVariation {
@@ -99,7 +102,7 @@ impl Default for SpeedVariation {
             plan: Plan::REST,
             phase: Phase::Idle,
             fault: Fault::NONE,
-            seen: [Pair([f64::NAN; 2]); 2],
+            seen: NOTHING_SEEN,
             flags: 0,
             asked: Setting::still(0.0).asked,
             now: Setting::still(0.0),

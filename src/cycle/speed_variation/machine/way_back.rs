@@ -56,6 +56,8 @@ impl SpeedVariation {
             self.fault = fault;
             self.output.message = fault.code;
         }
+        // An input that is wrong is looked at in every cycle: its load may change meanwhile, and change back.
+        self.seen = NOTHING_SEEN;
         match self.phase {
             Phase::Running if fault.code != GIB_ERR_DRIVE_FAULT => self.set_out(),
             Phase::Stopping if fault.code != GIB_ERR_DRIVE_FAULT => {} // on the way already
