@@ -36,7 +36,7 @@ pub enum Touch {
     Held,
     /// It has been for the detection time, at a stand.
     Pressed,
-    /// The command is at its goal and nothing was touched.
+    /// The command is at its goal, the axis stands, and nothing was touched.
     Arrived,
     /// The sensors contradict each other.
     Broken,
@@ -235,11 +235,30 @@ impl Side {
         if self.held {
             self.held = false;
             self.pressing = false;
+            self.standing = 0;
             self.trip = plan.threshold;
             self.trace.resume();
         }
         self.trace.add(self.position, self.reading);
-        if self.profile.step() { Touch::Arrived } else { Touch::Going }
+        if self.profile.step() { self.comes(plan) } else { Touch::Going }
+    }
+
+    /// The command is at its goal. The axis lags behind it, by much under a soft servo, and may meet the stop on the way that is left.
+    #[cold]
+    fn comes(&mut self, plan: &Plan) -> Touch {
+        self.stand(plan);
+        // At the end of its way it rests.
+        self.frozen = 0;
+        if self.standing >= plan.detection { Touch::Arrived } else { Touch::Going }
+    }
+
+    /// Counts the cycles for which it stands.
+    fn stand(&mut self, plan: &Plan) {
+        self.standing += 1;
+        if (self.position - self.anchor).abs() > plan.standing_way {
+            self.anchor = self.position;
+            self.standing = 0;
+        }
     }
 
     /// The torque is at the limit. The command goes on until the axis stands, so that an acceleration at the limit is
@@ -255,11 +274,7 @@ impl Side {
             self.anchor = self.position;
             self.standing = 0;
         }
-        self.standing += 1;
-        if (self.position - self.anchor).abs() > plan.standing_way {
-            self.anchor = self.position;
-            self.standing = 0;
-        }
+        self.stand(plan);
         // Under its limit an encoder may stand.
         self.frozen = 0;
         if self.goes_on(plan) {

@@ -206,15 +206,15 @@ impl Homing {
     #[cold]
     pub(super) fn untouched(&mut self, odd: Touch) {
         let plan = self.plan;
-        let (mut way, mut fault) = (0f64, Fault::NONE);
+        let mut fault = Fault::NONE;
         for side in self.sides.iter().take(plan.motors) {
-            way = way.max(side.travel(&plan));
             let first = odd == Touch::Broken && fault == Fault::NONE && (side.rigid(&plan) || side.stuck(&plan));
             fault = if first { side.broken_sensor(&plan) } else { fault };
         }
         if fault == Fault::NONE {
-            let (code, field, high) = (GIB_ERR_HOMING_NO_STOP, "distance_max_mm\0", plan.distance[1]);
-            fault = Fault { code, field, value: way, low: 0.0, high };
+            // All of it is gone; the stop must lie where the command goes.
+            let (code, field) = (GIB_ERR_HOMING_NO_STOP, "distance_max_mm\0");
+            fault = Fault { code, field, value: plan.distance[1], low: plan.distance[0], high: plan.reach() };
         }
         if fault.code == GIB_ERR_HOMING_NO_STOP && self.touch > 0 {
             // It was there the first time.
