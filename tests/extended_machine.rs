@@ -4,66 +4,26 @@
 use gib::diagnosis::causes::LAWS;
 use gib::diagnosis::experiment::telling;
 use gib::diagnosis::frame::{Columns, Frame};
-use gib::diagnosis::{Diagnosis, Excerpt, Verdict, diagnose};
+use gib::diagnosis::{Diagnosis, Verdict};
 use gib::machine::{Axis, Cause, Effect, Machine, Servo};
 use gib::plant::closed_loop::predict;
 use gib::plant::motion::smoothed;
-use gib::plant::moves::{Moves, Reach};
+use gib::plant::moves::Moves;
 use gib::plant::observed::Observed;
-use gib::plant::simulate::{Sensors, Setup, simulate};
+use gib::plant::simulate::Sensors;
 use gib::recording::{Column, Recording, Signal};
+use rig::{RIG, good, judged, named, recorded, recorded_by, rig, test_moves};
 use std::ops::Range;
 use std::path::PathBuf;
 
-/// What is believed of the rig of the demonstration.
-const RIG: &str = include_str!("../examples/machines/believed.json");
-
-fn rig(effects: &[Effect]) -> Axis {
-    Machine::parse(RIG).unwrap().axes[0].with_effects(effects.to_vec())
-}
-
-/// The sensors of a good drive.
-fn good(torque_noise: f64) -> Sensors {
-    Sensors { grid_um: 0.05, torque_noise, torque_grid: 0.001, ..Sensors::default() }
-}
-
-/// A recording of these moves, with the sensors of a good drive and more noise of the torque.
-fn recorded(truth: &Axis, moves: &Moves, seed: u64) -> Recording {
-    recorded_by(truth, moves, seed, good(0.03), false)
-}
-
-/// A recording of these moves by these sensors, with a scale on the table or without.
-fn recorded_by(truth: &Axis, moves: &Moves, seed: u64, sensors: Sensors, scale: bool) -> Recording {
-    let command = moves.command(truth.servo.unwrap().period_s);
-    let trace = simulate(truth, &command, &Setup { seed, sensors, ..Setup::default() }).unwrap();
-    let mut columns = vec![
-        Column::new("x.position_command_mm", trace.command),
-        Column::new("x.position_mm", trace.position),
-        Column::new("x.torque_nm", trace.torque),
-    ];
-    if scale {
-        columns.push(Column::new("x.table_position_mm", trace.table_position));
-    }
-    Recording::from_columns("simulated", trace.time_s, columns).unwrap()
-}
+#[path = "common/rig.rs"]
+mod rig;
 
 /// The rows of a recording from one on.
 fn from_row(whole: &Recording, first: usize) -> Recording {
     let columns = whole.columns.iter().filter(|c| c.label.is_some());
     let columns = columns.map(|c| Column::new(&c.name, c.values[first..].to_vec())).collect();
     Recording::from_columns("simulated", whole.time_s[first..].to_vec(), columns).unwrap()
-}
-
-fn test_moves() -> Moves {
-    Moves::built_in("test", &Reach { start: 20.0, stroke: 200.0, speed: 250.0, acceleration: 2500.0 }).unwrap()
-}
-
-fn judged(axis: &Axis, recording: &Recording) -> Diagnosis {
-    diagnose(axis, &Excerpt::of(recording, axis), None, &|_, _| true).unwrap()
-}
-
-fn named(d: &Diagnosis) -> Vec<Cause> {
-    d.findings.iter().map(|f| f.effect.cause()).collect()
 }
 
 /// A torque caught anywhere in the servo's cycle: where the motor lags by half a cycle, half a cycle of delay moves the column
@@ -240,53 +200,6 @@ fn what_a_spring_swings_when_a_recording_begins_is_no_discrepancy() {
         let whole = recorded(&rig(&[spring, cogging]), &test_moves(), seed);
         let begun = from_row(&whole, swinging(&whole));
         assert_eq!(named(&judged(&rig(&[spring]), &begun)), vec![Cause::Cogging]);
-    }
-}
-
-/// Flanks a little softer than believed meet a little later and rebound: each impact is another, and it is the clearance that is
-/// believed all the same. What is not believed is named beside it, and a clearance that has grown takes the place of the believed
-/// one.
-#[test]
-fn impacts_may_be_a_little_other_than_believed_and_a_clearance_may_not() {
-    let clearance = |width_um: f64, contact_hz: f64| Effect::Backlash {
-        width_um,
-        table_inertia_share: 0.45,
-        table_friction_share: 0.7,
-        contact_hz,
-    };
-    let believed = rig(&[clearance(30.0, 900.0)]);
-    for seed in [3, 4] {
-        let d = judged(&believed, &recorded_by(&rig(&[clearance(30.0, 700.0)]), &test_moves(), seed, good(0.01), true));
-        assert_eq!(d.verdict, Verdict::NoDiscrepancy, "{:?} {:?}", d.findings, d.unexplained);
-        let sticky = Effect::StribeckFriction { torque: 0.3, velocity_mm_s: 8.0, exponent: 2.0 };
-        let d = judged(
-            &believed,
-            &recorded_by(&rig(&[clearance(30.0, 700.0), sticky]), &test_moves(), seed, good(0.01), true),
-        );
-        assert_eq!(named(&d), vec![Cause::StribeckFriction], "{:?}", d.verdict);
-        for scale in [false, true] {
-            let d = judged(
-                &believed,
-                &recorded_by(&rig(&[clearance(37.0, 900.0)]), &test_moves(), seed, good(0.01), scale),
-            );
-            let [Effect::Backlash { width_um, .. }] = d.extended.effects[..] else {
-                panic!("{:?}", d.extended.effects)
-            };
-            assert!((width_um / 37.0 - 1.0).abs() < 0.05, "{seed} {scale}: {width_um}");
-        }
-    }
-}
-
-/// What a ripple of the belief leaves is no ripple beside it: two of one period have no phases of their own.
-#[test]
-fn a_ripple_of_another_size_takes_the_place_of_the_believed_one() {
-    let ripple = |amplitude| Effect::Cogging { amplitude, period_mm: 2.5 };
-    for (seed, amplitude) in [(5, 0.18), (6, 0.13), (7, 0.06)] {
-        let d = judged(&rig(&[ripple(0.1)]), &recorded(&rig(&[ripple(amplitude)]), &test_moves(), seed));
-        let [Effect::Cogging { amplitude: found, period_mm }] = d.extended.effects[..] else {
-            panic!("{amplitude}: {:?} {:?}", d.extended.effects, d.notes)
-        };
-        assert!((found / amplitude - 1.0).abs() < 0.03 && (period_mm / 2.5 - 1.0).abs() < 1e-3, "{amplitude}: {found}");
     }
 }
 

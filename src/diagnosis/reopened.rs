@@ -3,43 +3,63 @@
 //! The effect is then looked for as if nothing were known of it, and what is found takes its place.
 
 use super::belief;
-use super::fit::Bench;
+use super::fit::{Bench, Fit};
 use super::frame::Frame;
 use super::judge::{TOLERABLE_EXCESS, rms};
 use super::known::{Known, has_phase, numbers};
-use super::select::is_physical;
+use super::progress::{Stopped, Watch};
+use super::select::{Search, is_physical};
+use super::verdict::{Diagnosis, Left};
 use crate::machine::{Axis, Cause, Effect};
 
 /// Most steps of a fit.
 const STEPS: usize = 8;
-/// What other numbers leave at most of what the believed ones do, in amplitude.
+/// Excess over the noise floor (in variance) that causes may leave: a floor that is read off a thousand rows is known better.
+const LITTLE_LEFT_BY_CAUSES: f64 = 0.2;
+/// What other numbers leave at most of what was left above the noise floor, in amplitude.
 const MOST_LEFT: f64 = 0.5;
 /// The same of a ripple: what is left beside one is a ripple of the same period, and not another.
 const MOST_LEFT_OF_RIPPLE: f64 = 0.96;
 
-/// The axis without the effect that other numbers put right; `bench` is with all that is believed of it. `None` where that leaves
-/// little more than noise, or no other numbers of one of its effects help.
-#[must_use]
-pub fn without_misjudged(axis: &Axis, frame: &Frame, bench: &Bench) -> Option<Axis> {
-    let believed = bench.rest(&bench.fit(Vec::new()));
-    let above = |c: usize| (rms(&believed[c]) / frame.floor(&believed[c], c == 0)).powi(2) - 1.0 > TOLERABLE_EXCESS;
-    let channels: Vec<usize> = (0..2).filter(|&c| !believed[c].is_empty() && above(c)).collect();
-    if channels.is_empty() {
-        return None;
-    }
-    let left = (0..axis.effects.len()).filter(|&i| is_by_itself(axis, &axis.effects[i])).filter_map(|i| {
+/// The axis without the effect that other numbers put right; `found` is what was found on `bench`, beside all that is believed of it.
+/// `None` where that leaves little more than noise, or no other numbers of one of its effects leave less by far.
+///
+/// # Errors
+/// [`Stopped`] when the watch's caller said so.
+pub fn without_misjudged(
+    axis: &Axis,
+    bench: &Bench,
+    found: &Diagnosis,
+    watch: &Watch,
+) -> Result<Option<Axis>, Stopped> {
+    let frame = bench.frame;
+    let excess = |rms: f64, noise: f64| (rms.powi(2) - noise.powi(2)).max(0.0);
+    let least = if found.findings.is_empty() { TOLERABLE_EXCESS } else { LITTLE_LEFT_BY_CAUSES };
+    let unexplained = [Some(&found.unexplained.torque), found.unexplained.table.as_ref()];
+    let above =
+        |left: &Left| Some(excess(left.rms, left.noise_rms)).filter(|all| *all > least * left.noise_rms.powi(2));
+    let all = unexplained.map(|left| left.and_then(above));
+    let mut best: (f64, Option<Axis>) = (1.0, None);
+    for (i, effect) in axis.effects.iter().enumerate().filter(|_| all.iter().any(Option::is_some)) {
+        let Some((law, shape)) = numbers(axis, frame, effect).filter(|_| is_by_itself(axis, effect)) else { continue };
         let mut others = axis.effects.clone();
-        let effect = others.remove(i);
+        others.remove(i);
         let without = axis.with_effects(others);
-        let (law, shape) = numbers(axis, frame, &effect)?;
         let other = Bench::new(frame, &Known::of(&without, frame));
-        let fit = other.refine_roughly(other.fit(other.parts(law, vec![shape])), 0, STEPS);
-        let rest = other.rest(&fit);
-        let left = channels.iter().map(|&c| rms(&rest[c]) / rms(&believed[c])).fold(f64::INFINITY, f64::min);
-        let most_left = if has_phase(&effect) { MOST_LEFT_OF_RIPPLE } else { MOST_LEFT };
-        (is_physical(&other, &fit) && left < most_left).then_some((left, without))
-    });
-    left.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, without)| without)
+        let near = other.refine_roughly(other.fit(other.parts(law, vec![shape])), 0, STEPS);
+        let far = Search::new(&other, &[law], watch)?.from_belief()?.fit;
+        let share_left = |fit: &Fit| {
+            let above = |(c, rest): (usize, &Vec<f64>)| Some(excess(rms(rest), frame.floor(rest, c == 0)) / all[c]?);
+            other.rest(fit).iter().enumerate().filter_map(above).fold(f64::INFINITY, f64::min).sqrt()
+        };
+        let physical = [near, far].into_iter().filter(|fit| is_physical(&other, fit));
+        let left = physical.map(|fit| share_left(&fit)).fold(f64::INFINITY, f64::min);
+        let most_left = if has_phase(effect) { MOST_LEFT_OF_RIPPLE } else { MOST_LEFT };
+        if left < most_left.min(best.0) {
+            best = (left, Some(without));
+        }
+    }
+    Ok(best.1)
 }
 
 /// Whether an effect is not found beside what is believed of it: there is one of it, or two side by side imitate anything, as two

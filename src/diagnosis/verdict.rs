@@ -176,13 +176,12 @@ fn answer(recorded: &Recorded, frame: &Frame, notes: Vec<String>) -> Result<Diag
     let Recorded { axis, belief, .. } = recorded;
     if axis == belief && !axis.effects.is_empty() {
         let named: Vec<Effect> = found.findings.iter().map(|finding| finding.effect).collect();
-        let misjudged = match found.verdict {
-            Verdict::UnknownCause | Verdict::NoDiscrepancy => reopened::without_misjudged(axis, frame, &bench),
-            _ => reopened::without_found_again(axis, frame, &named),
-        };
-        if let Some(belief) = &misjudged {
+        let misjudged = reopened::without_misjudged(axis, &bench, &found, recorded.watch)?;
+        let to_leave_less = misjudged.is_some() && !named.is_empty();
+        if let Some(belief) = &misjudged.or_else(|| reopened::without_found_again(axis, frame, &named)) {
             let again = answer(&Recorded { belief, ..*recorded }, frame, notes.clone())?;
-            if !again.findings.is_empty() {
+            let more = to_leave_less && again.unexplained.torque.rms > found.unexplained.torque.rms;
+            if !again.findings.is_empty() && !more {
                 return Ok(again);
             }
         }
