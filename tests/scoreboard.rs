@@ -192,6 +192,13 @@ fn springs_are_named_whatever_the_table_and_however_it_began() {
     named_alone("drive_compliance", &[(992, 46), (991, 74), (995, 25)]);
 }
 
+/// A simulated table behind a coarse encoder swings by its grid: the rows tell a spring that is damped as none is. Means over some swings
+/// tell the real one.
+#[test]
+fn a_spring_whose_table_the_grid_drives_is_named() {
+    named_alone("drive_compliance", &[(994, 60)]);
+}
+
 /// Friction that builds up over a few steps of the encoder shows only where the axis seems to rest.
 #[test]
 fn friction_that_yields_over_a_micrometre_is_seen_where_the_axis_creeps() {

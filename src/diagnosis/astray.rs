@@ -1,6 +1,7 @@
 //! What becomes of sets of causes that were fitted beyond physical bounds.
 
 use super::fit::{Bench, Fit, Part, figure};
+use super::means;
 use super::select::{is_within_bounds, price, refined};
 
 /// Least gain of a cause that has strayed beyond physical bounds for it to be put right: a third of what is left. What strays and
@@ -34,5 +35,6 @@ pub fn put_right(bench: &Bench, set: &Fit, fit: &Fit) -> Option<Fit> {
     let starts = bench.parts(law, (law.manner.restarts)(shape)).into_iter();
     let starts = starts.map(|part| (figure(&bench.joined(set, &part)), part));
     let (_, part) = starts.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(refined(bench, set, part))
+    let again = refined(bench, set, part);
+    if is_within_bounds(bench, &again, new) { Some(again) } else { means::told(bench, set, &again.parts[new]) }
 }

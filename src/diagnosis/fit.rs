@@ -207,6 +207,14 @@ impl<'f, 'a> Bench<'f, 'a> {
         Fit { parts, coefficients, residual, basis, rows: self.rows }
     }
 
+    /// The others of a set, fitted without one of its parts; their non-linear parameters stay.
+    #[must_use]
+    pub fn without(&self, fit: &Fit, part: usize) -> Fit {
+        let mut parts = fit.parts.clone();
+        parts.remove(part);
+        self.fit(parts)
+    }
+
     /// Sum of squares per channel if this part joined a fit whose other parts keep their non-linear parameters.
     #[must_use]
     pub fn joined(&self, fit: &Fit, part: &Part) -> Vec<f64> {

@@ -26,6 +26,8 @@ pub const TOLERABLE_EXCESS: f64 = 0.6;
 const TOLERABLE_IF_UNTIED: f64 = 3.0;
 /// Share of the excess that named causes must remove together.
 const LEAST_EXPLAINED: f64 = 0.8;
+/// The same where they leave little, and nothing of the curve that they follow: the floor does not see all that an encoder's grid makes.
+const LEAST_EXPLAINED_OF_LITTLE: f64 = 0.6;
 /// The same where what they leave may be noise.
 const LEAST_EXPLAINED_OF_NOISE: f64 = 0.4;
 /// The same for lost motion: rigid flanks that meet without rebound place a clearance well, but not each impact.
@@ -67,6 +69,8 @@ pub struct Judged {
     pub replay: Option<Replay>,
     /// What explains the recording and is not named all the same.
     pub refutation: Option<String>,
+    /// What explains some of it, where nothing explains enough.
+    pub nearest: Option<String>,
 }
 
 impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
@@ -89,7 +93,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     /// # Errors
     /// [`Stopped`] when the watch's caller said so.
     pub fn judge(&self, mut found: Selection) -> Result<Judged, Stopped> {
-        let Some(mut verdict) = self.explains(&found.fit) else { return Ok(self.nothing(&found)) };
+        let Some(mut verdict) = self.explains(&found.fit) else { return Ok(self.too_little(&found)) };
         if let Some(goes) = foreign::stands_for(self.bench, &self.empty, &found.fit, self.watch)? {
             return Ok(Judged { refutation: Some(imitation(&found.fit, goes)), ..self.nothing(&found) });
         }
@@ -98,7 +102,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         // Below the noise floor there is nothing but what the encoder makes, which drives the simulation too.
         if let Some(less) = less.take_if(|less| Excess::of(self.bench, less, &found.fit).largest() <= 0.0) {
             (found.fit, found.alike) = (less, Vec::new());
-            let Some(still) = self.explains(&found.fit) else { return Ok(self.nothing(&found)) };
+            let Some(still) = self.explains(&found.fit) else { return Ok(self.too_little(&found)) };
             verdict = still;
         }
         let mut errors = self.errors(&found.fit)?;
@@ -109,7 +113,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             gains.extend(gain::of_stretch(without.as_ref(), errors.as_ref()));
             if is_idle(&gains) {
                 (found.fit, found.alike, errors) = (less, Vec::new(), without);
-                let Some(still) = self.explains(&found.fit) else { return Ok(self.nothing(&found)) };
+                let Some(still) = self.explains(&found.fit) else { return Ok(self.too_little(&found)) };
                 verdict = still;
             }
         }
@@ -123,7 +127,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let Weighed { gains, in_judged_rows, fails } = weighed;
         if !fails {
             let replay = errors.and_then(|errors| errors.replay);
-            return Ok(Judged { verdict, selection: found, gains, replay, refutation: None });
+            return Ok(Judged { verdict, selection: found, gains, replay, refutation: None, nearest: None });
         }
         let causes = found.fit.parts.iter().map(|p| p.law.cause);
         let refutation = refutation(causes, &in_judged_rows, "rows that it was not fitted to");
@@ -149,10 +153,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     /// A set without what is simulated behind the measured motion (a spring, a clearance), where that may gain by taking off what
     /// the encoder's noise makes alone: half of a channel's rest is never that.
     fn without_spring(&self, fit: &Fit) -> Option<Fit> {
-        let simulated = fit.table()?;
-        let mut parts = fit.parts.clone();
-        parts.remove(simulated);
-        let less = self.bench.refine(self.bench.fit(parts), 0, 4);
+        let less = self.bench.refine(self.bench.without(fit, fit.table()?), 0, 4);
         (!fit.halves(&less)).then_some(less)
     }
 
@@ -167,7 +168,17 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             gains: self.held_out.gains(self.believed.as_ref(), self.believed.as_ref()),
             replay: None,
             refutation: None,
+            nearest: None,
         }
+    }
+
+    /// The same where they do not explain enough: that is said of an unknown cause.
+    fn too_little(&self, found: &Selection) -> Judged {
+        let nothing = self.nothing(found);
+        let after = Excess::of(self.bench, &found.fit, &found.fit);
+        let share = Excess::of(self.bench, &self.empty, &found.fit).explained_by(&after);
+        let says = nothing.verdict == Verdict::UnknownCause && !found.fit.parts.is_empty();
+        Judged { nearest: says.then(|| too_little(&found.fit, share)), ..nothing }
     }
 
     /// Whether what a fit leaves above the noise floor may be noise that the floor does not see.
@@ -182,17 +193,20 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let before = Excess::of(self.bench, &self.empty, fit);
         let after = Excess::of(self.bench, fit, fit);
         let lost_motion = fit.parts.iter().any(|p| p.law.cause == Cause::Backlash);
+        let much_left = after.largest() > LITTLE_LEFT;
+        let another_curve = is_another_curve(self.bench, &self.empty, fit);
         let least = if lost_motion {
             LEAST_EXPLAINED_LOST_MOTION
         } else if self.may_be_noise(fit, &after) {
             LEAST_EXPLAINED_OF_NOISE
+        } else if !much_left && !another_curve {
+            LEAST_EXPLAINED_OF_LITTLE
         } else {
             LEAST_EXPLAINED
         };
         let too_little = before.largest() > TOLERABLE_EXCESS && before.explained_by(&after) < least;
-        let much_left = after.largest() > LITTLE_LEFT;
         let nameless = fit.effects(self.bench.frame).next().is_none();
-        if nameless || too_little || much_left && is_another_curve(self.bench, &self.empty, fit) {
+        if nameless || too_little || much_left && another_curve {
             None
         } else if much_left {
             Some(Verdict::PartlyExplained)
@@ -258,8 +272,20 @@ fn is_idle(gains: &[Gain]) -> bool {
 
 /// Says what imitates a law that has no name.
 fn imitation(fit: &Fit, goes: &str) -> String {
-    let causes: Vec<&str> = fit.parts.iter().map(|part| part.law.cause.name()).collect();
-    format!("{} would explain much, but what is there goes {goes}, for which gib has no name", causes.join(" with "))
+    format!("{} would explain much, but what is there goes {goes}, for which gib has no name", with_each_other(fit))
+}
+
+/// Says what explains this share of what lies above the noise, and not enough of it or not by its own curve.
+fn too_little(fit: &Fit, share: f64) -> String {
+    let percent = (100.0 * share).clamp(0.0, 99.0);
+    format!(
+        "{} would explain {percent:.0} % of what lies above the noise and leave what the cause itself would not: it imitates something else and is not named",
+        with_each_other(fit)
+    )
+}
+
+fn with_each_other(fit: &Fit) -> String {
+    fit.parts.iter().map(|part| part.law.cause.name()).collect::<Vec<_>>().join(" with ")
 }
 
 /// Says what causes are refuted, and by which rows.

@@ -30,6 +30,7 @@ mod json;
 mod judge;
 mod known;
 mod many;
+mod means;
 mod narrow;
 pub mod progress;
 mod reopened;

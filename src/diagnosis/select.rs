@@ -13,6 +13,7 @@ use super::form;
 use super::formulation;
 use super::judge::{Excess, LITTLE_LEFT};
 use super::many::add;
+use super::means;
 use super::progress::{Stopped, Watch};
 use super::shrink::{idle_left_out, shrink};
 use super::valleys;
@@ -166,7 +167,7 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     let open = idle_left_out(search.bench, search.with_beliefs(&start), search.watch)?;
     let start = if price(&open) < price(&start) { open } else { start };
     let fit = shrink(search.bench, start, search.watch)?;
-    let fit = valleys::settled(search.bench, search.laws, fit, search.watch)?;
+    let fit = means::settled(search.bench, valleys::settled(search.bench, search.laws, fit, search.watch)?);
     rivals.retain(|r| r.parts.len() == fit.parts.len() && !same_causes(r, &fit));
     let plain = Selection { fit, rivals, alike: Vec::new() };
     let found = formulation::settled(search.bench, plain, search.watch)?;
@@ -276,9 +277,7 @@ fn leaves_much(bench: &Bench, set: &Fit) -> bool {
 /// A set without what turns a table round, where it has that and no table.
 fn without_stand_in(bench: &Bench, set: &Fit) -> Option<Fit> {
     let at = set.parts.iter().position(|part| part.law.manner.turns_table)?;
-    let mut parts = set.parts.clone();
-    parts.remove(at);
-    (set.table().is_none() && !parts.is_empty()).then(|| bench.fit(parts))
+    (set.table().is_none() && set.parts.len() > 1).then(|| bench.without(set, at))
 }
 
 /// The sets with each of these laws added that may come among the best beside others: those that are worth it, best first.
@@ -359,7 +358,7 @@ pub fn refined(bench: &Bench, set: &Fit, part: Part) -> Fit {
     let count = set.parts.len();
     let fit = bench.refine_roughly(bench.fit(parts), count, 6);
     let fit = bench.refine_roughly(fit, 0, if count == 0 { 4 } else { 2 });
-    formulation::suited(bench, fit, 2)
+    means::told_again(bench, formulation::suited(bench, fit, 2))
 }
 
 fn may_join(set: &Fit, law: &Law) -> bool {

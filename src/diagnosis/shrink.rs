@@ -27,11 +27,7 @@ const LEAST_SHARE: f64 = 0.001;
 pub fn idle_left_out(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
     loop {
         let each: Vec<usize> = (0..fit.parts.len()).collect();
-        let without = watch.each(&each, (0.8, 0.8), "leaving out what is not needed", |&i| {
-            let mut parts = fit.parts.clone();
-            parts.remove(i);
-            bench.fit(parts)
-        })?;
+        let without = watch.each(&each, (0.8, 0.8), "leaving out what is not needed", |&i| bench.without(&fit, i))?;
         let weakest = without.into_iter().min_by(|a, b| price(a).total_cmp(&price(b)));
         match weakest.filter(|less| price(less) - price(&fit) < LEAST_GAIN) {
             Some(less) => fit = less,
@@ -51,9 +47,7 @@ pub fn shrink(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped
     while !fit.parts.is_empty() {
         let each: Vec<usize> = (0..fit.parts.len()).collect();
         let mut without = watch.each(&each, (0.8, 0.9), "leaving out what is not needed", |&i| {
-            let mut parts = fit.parts.clone();
-            parts.remove(i);
-            bench.refine(bench.fit(parts), 0, 4)
+            bench.refine(bench.without(&fit, i), 0, 4)
         })?;
         let Some(&weakest) = each.iter().min_by(|a, b| price(&without[**a]).total_cmp(&price(&without[**b]))) else {
             break;

@@ -188,6 +188,15 @@ pub fn effects(bench: &Bench, fit: &Fit, sure: Option<&Sure>) -> Vec<Option<(Eff
                 ends.iter().fold(found, |all, (unknown, range)| all.hypot(gradient[(k, *unknown)] * range))
             };
             let mut deviations: Vec<f64> = (0..values.len()).map(deviation).collect();
+            for &(index, off) in part.law.manner.taken {
+                let ends = [off, -off].map(|off| {
+                    let mut shape = part.shape.clone();
+                    shape[index] += off;
+                    effect_of(&shape, &fit.coefficients[i]).map_or_else(|| values.clone(), |moved| moved.values())
+                });
+                let apart = ends[0].iter().zip(&ends[1]).map(|(above, below)| 0.5 * (above - below));
+                deviations.iter_mut().zip(apart).for_each(|(deviation, off)| *deviation = deviation.hypot(off));
+            }
             match (effect, deviations.as_mut_slice()) {
                 (Effect::DeadTime { .. }, [deviation]) => {
                     let by_frame = bench.frame.sampling.deviation_s().hypot(grids::delay_s(bench.frame));

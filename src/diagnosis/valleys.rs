@@ -24,9 +24,8 @@ pub fn settled(bench: &Bench, laws: &[&'static Law], fit: Fit, watch: &Watch) ->
         return Ok(fit);
     }
     let part = &fit.parts[at];
-    let mut others = fit.parts.clone();
-    others.remove(at);
-    let beside = bench.fit(others.clone());
+    let beside = bench.without(&fit, at);
+    let others = &beside.parts;
     let spring = laws.iter().filter(|law| law.cause == Cause::DriveCompliance && part.law.cause == Cause::Backlash);
     let as_spring = spring.map(|&law| (law, bench.starts(law, &beside).into_iter().step_by(EVERY).collect()));
     let tried: Vec<(&'static Law, Vec<Vec<f64>>)> =

@@ -230,7 +230,7 @@ fn answer_on(
             judged = again;
         }
     }
-    notes.extend(judged.refutation.take());
+    notes.extend(judged.refutation.take().or(judged.nearest.take()));
     let replayed = replayed::refined(bench, judge.held_out(), &judged, watch)?;
     let sure = replayed.map(|replayed| {
         judged.selection.fit = replayed.fit;
@@ -379,13 +379,8 @@ fn findings(axis: &Axis, bench: &Bench, selection: &Selection, sure: Option<&Sur
     uncertainty::widen(bench, &mut effects, &selection.alike);
     belief::reconcile(bench.frame.axis, effects.iter_mut().flatten().map(|(effect, _)| effect));
     let total = 1.0 - (fit.squares() / empty.squares()).min(1.0);
-    let drops: Vec<f64> = (0..fit.parts.len())
-        .map(|i| {
-            let mut parts = fit.parts.clone();
-            parts.remove(i);
-            (bench.fit(parts).squares() - fit.squares()).max(0.0)
-        })
-        .collect();
+    let drops: Vec<f64> =
+        (0..fit.parts.len()).map(|i| (bench.without(fit, i).squares() - fit.squares()).max(0.0)).collect();
     let sum = drops.iter().sum::<f64>().max(1e-300);
     let mut list: Vec<Finding> = Vec::new();
     for (i, found) in effects.into_iter().enumerate() {
@@ -421,9 +416,7 @@ fn nameless(frame: &Frame, fit: &Fit) -> Option<String> {
 
 /// Probability that the cause's gain is not chance: Student's t over blocks, as a normal's tail.
 fn confidence(bench: &Bench, fit: &Fit, part: usize) -> f64 {
-    let mut parts = fit.parts.clone();
-    parts.remove(part);
-    let t = block_t(bench, &bench.fit(parts), fit);
+    let t = block_t(bench, &bench.without(fit, part), fit);
     // Logistic approximation of the normal distribution.
     (1.0 / (1.0 + (-1.702 * t).exp())).clamp(0.0, 0.9999)
 }

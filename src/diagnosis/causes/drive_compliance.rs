@@ -31,17 +31,19 @@ const FRICTION_SHARE: f64 = 0.7;
 const SELDOM: [[f64; 2]; 2] = [[0.25, 0.8], [0.8, 0.4]];
 /// Damping ratio there.
 const DAMPING: f64 = 0.03;
+/// The same where the rows do not tell it: drives have a tenth and less, and the more it is the less a simulated table is driven by
+/// the encoder's grid.
+const DAMPING_BY_MEANS: f64 = 0.1;
+
+/// How the table's own frequency and its share of the friction over that of the inertia are searched.
+const OWN_HZ: Scale = Scale::Log(2.0, FASTEST_HZ);
+const RUBBING: Scale = Scale::Log(0.02, 25.0);
 
 /// Parameters: the table's own frequency in Hz, share of the inertia on the table's side, share of the friction there over that,
 /// damping ratio of the table's own swing.
 pub static LAW: Law = Law {
     cause: Cause::DriveCompliance,
-    scales: &[
-        Scale::Log(2.0, FASTEST_HZ),
-        Scale::Linear(0.04, 0.95, 0.01),
-        Scale::Log(0.02, 25.0),
-        Scale::Log(2e-3, MOST_DAMPING),
-    ],
+    scales: &[OWN_HZ, Scale::Linear(0.04, 0.95, 0.01), RUBBING, Scale::Log(2e-3, MOST_DAMPING)],
     starts: |frame, rest| {
         // Behind a motor that moves as measured the table swings at its own frequency √(k/J₂), within a band of twice the
         // damping ratio: starts farther apart than that would miss it.
@@ -74,22 +76,59 @@ pub static LAW: Law = Law {
             let at = less.map(|(less, share)| vec![own * less.sqrt(), share, rubbing * less, DAMPING]);
             at.filter(|shape| shape[1] * shape[2] <= MOST_FRICTION).collect()
         },
-        damped: |shape, more| {
-            let &[own, share, rubbing, damping] = shape else { return None };
-            Some(vec![own, share, rubbing, damping * more])
-        },
+        damped,
         ..PLAIN
     },
-    terms: Terms::Simulated(|frame, resistance, shapes| {
-        let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(frame, shape)).collect();
-        table_side::terms(frame, resistance, &effects)
-    }),
-    effect: |frame, shape, _| {
-        let swings = |found: &Effect| matches!(found, Effect::DriveCompliance { damping_ratio, .. } if *damping_ratio < 0.9 * MOST_DAMPING);
-        effect(frame, shape).filter(swings)
+    terms: Terms::Simulated(terms),
+    effect: swinging,
+    confused_with: CONFUSED_WITH,
+    sentence,
+};
+
+/// The same of a table that the encoder's grid drives at its own frequency: by the rows it would be damped as none is, and weigh nothing
+/// lest it swing. Means over some swings tell its frequency and its friction; its mass and its damping are taken for granted.
+pub static BY_MEANS: Law = Law {
+    cause: Cause::DriveCompliance,
+    scales: &[OWN_HZ, Scale::Choice, RUBBING, Scale::Choice],
+    starts: |_, _| Vec::new(),
+    manner: Manner {
+        restarts: |shape| {
+            let Some(&own) = shape.first() else { return Vec::new() };
+            [0.3, 0.5, 0.7, 0.9].map(|friction| vec![own, SHARE, friction / SHARE, DAMPING_BY_MEANS]).into()
+        },
+        damped,
+        told_by_means: true,
+        // 95 %: a share from a tenth to nine tenths, a damping from nothing to twice what is taken.
+        taken: &[(1, 0.2), (3, 0.5 * DAMPING_BY_MEANS)],
+        ..PLAIN
     },
-    confused_with: &[Cause::InertiaMismatch, Cause::Backlash, Cause::PreslidingFriction],
-    sentence: |effect, axis| match effect {
+    terms: Terms::Simulated(terms),
+    effect: swinging,
+    confused_with: CONFUSED_WITH,
+    sentence,
+};
+
+const CONFUSED_WITH: &[Cause] = &[Cause::InertiaMismatch, Cause::Backlash, Cause::PreslidingFriction];
+
+fn terms(frame: &Frame, resistance: &Resistance, shapes: &[Vec<f64>]) -> Vec<Term> {
+    let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(frame, shape)).collect();
+    table_side::terms(frame, resistance, &effects)
+}
+
+/// The effect, if it is one of a drive that swings.
+fn swinging(frame: &Frame, shape: &[f64], _: &[f64]) -> Option<Effect> {
+    let swings = |found: &Effect| matches!(found, Effect::DriveCompliance { damping_ratio, .. } if *damping_ratio < 0.9 * MOST_DAMPING);
+    effect(frame, shape).filter(swings)
+}
+
+/// The same spring, its swing damped more.
+fn damped(shape: &[f64], more: f64) -> Option<Vec<f64>> {
+    let &[own, share, rubbing, damping] = shape else { return None };
+    Some(vec![own, share, rubbing, damping * more])
+}
+
+fn sentence(effect: &Effect, axis: &Axis) -> String {
+    match effect {
         Effect::DriveCompliance { resonance_hz, stiffness_n_um, .. } => format!(
             "The drive is elastic: motor and table swing against each other at {} Hz ({} N/{}), so coupling, screw or bearing gives.",
             say(*resonance_hz),
@@ -97,8 +136,8 @@ pub static LAW: Law = Law {
             if axis.drive.is_rotary() { "0.001°" } else { "µm" }
         ),
         _ => String::new(),
-    },
-};
+    }
+}
 
 fn effect(frame: &Frame, shape: &[f64]) -> Option<Effect> {
     let [own_hz, table_inertia_share, rubbing, own_damping]: [f64; 4] = shape.try_into().ok()?;

@@ -9,7 +9,7 @@ mod constant_torque;
 mod coulomb_friction_mismatch;
 mod dead_time;
 mod direction_dependent_friction;
-mod drive_compliance;
+pub mod drive_compliance;
 mod external_vibration;
 mod inertia_mismatch;
 mod position_dependent_friction;
@@ -111,6 +111,10 @@ pub struct Manner {
     pub approached: bool,
     /// Whether a table behind a spring or a clearance turns round in quite another way with it.
     pub turns_table: bool,
+    /// Whether its non-linear parameters are told by means over several rows (`means`) and stay where the rows themselves are fitted.
+    pub told_by_means: bool,
+    /// Indices of non-linear parameters that are taken for granted, and by how much they may be off (a standard deviation).
+    pub taken: &'static [(usize, f64)],
 }
 
 /// That of a law that does not stray, with a trace that is worked out row by row, from starts that the recording gives.
@@ -122,6 +126,8 @@ const PLAIN: Manner = Manner {
     starts_from_rest: false,
     approached: false,
     turns_table: false,
+    told_by_means: false,
+    taken: &[],
 };
 
 /// How traces are come by, one for each set of non-linear parameters.

@@ -23,9 +23,10 @@ impl Bench<'_, '_> {
     /// [`Stopped`] when the watch's caller said so.
     pub fn refine_across(&self, fit: Fit, most: usize, watch: &Watch) -> Result<Fit, Stopped> {
         let look_about = |fit: &Fit| {
-            let look = |part: &Part| _ = self.both_sides(part);
+            let look = |part: &&Part| _ = self.both_sides(part);
+            let open: Vec<&Part> = fit.parts.iter().filter(|part| self.tells(part)).collect();
             // Who says stop is heard after the fit.
-            _ = watch.each(&fit.parts, (0.8, 0.8), "fitting causes", look);
+            _ = watch.each(&open, (0.8, 0.8), "fitting causes", look);
         };
         let fit = self.refine_while(fit, 0, most, 1e-5, look_about);
         watch.at(0.8, "fitting causes").map(|()| fit)
@@ -41,7 +42,7 @@ impl Bench<'_, '_> {
         let mut fit = self.at_one(fit);
         for _ in 0..most {
             look_about(&fit);
-            let slopes = self.slopes(&fit, first);
+            let slopes = self.open_slopes(&fit, first);
             if slopes.is_empty() {
                 break;
             }

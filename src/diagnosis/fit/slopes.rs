@@ -29,7 +29,21 @@ impl Bench<'_, '_> {
     /// How the model's sum changes with each non-linear parameter (in the units of its scale).
     #[must_use]
     pub fn slopes(&self, fit: &Fit, first: usize) -> Vec<Slope> {
-        let parts = fit.parts.iter().enumerate().skip(first);
+        self.slopes_of(fit, first, |_| true)
+    }
+
+    /// The same of those parameters that these rows are to tell.
+    pub(super) fn open_slopes(&self, fit: &Fit, first: usize) -> Vec<Slope> {
+        self.slopes_of(fit, first, |part| self.tells(part))
+    }
+
+    /// Whether these rows are to tell the non-linear parameters of a part.
+    pub(super) fn tells(&self, part: &Part) -> bool {
+        !part.law.manner.told_by_means || self.is_of_means()
+    }
+
+    fn slopes_of(&self, fit: &Fit, first: usize, open: impl Fn(&Part) -> bool) -> Vec<Slope> {
+        let parts = fit.parts.iter().enumerate().skip(first).filter(|(_, part)| open(part));
         parts
             .flat_map(|(i, part)| {
                 let table = fit.table().filter(|_| part.law.manner.turns_table).map(|at| &fit.parts[at]);

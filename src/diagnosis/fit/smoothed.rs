@@ -42,6 +42,12 @@ impl Bench<'_, '_> {
         Self { measured, doubt, certain, free, resistance, rows: windows.len(), windows, ..*self }
     }
 
+    /// Whether several rows are summed to one.
+    #[must_use]
+    pub fn is_of_means(&self) -> bool {
+        !self.windows.is_empty()
+    }
+
     /// A set of causes fitted on other equations of the same rows, on these.
     #[must_use]
     pub fn again(&self, set: &Fit) -> Fit {
