@@ -1,6 +1,6 @@
 //! How hard the flanks of a clearance meet is hardly to be seen in rows that are no faster than they swing, and the sum of
-//! squares has a minimum at almost every hardness, each with a width and shares of its own. So the fit is made from soft to
-//! hard, and how far those lie apart that leave about as much is a part of the uncertainty. What hardness the machine is given is
+//! squares has a minimum at almost every hardness, each with a width and shares of its own. So the fit is made from hard to
+//! soft, and how far those lie apart that leave about as much is a part of the uncertainty. What hardness the machine is given is
 //! what predicts its torque best: an impact that is hard and comes a row too late errs twice.
 
 use super::fit::{Bench, Fit};
@@ -10,8 +10,8 @@ use super::progress::{Stopped, Watch};
 use super::select::{Selection, is_physical};
 use crate::machine::Cause;
 
-/// How hard flanks meet where a fit begins, Hz.
-const FROM_SOFT_TO_HARD: [f64; 5] = [200.0, 300.0, 450.0, 650.0, 900.0];
+/// How hard flanks meet where a fit begins, Hz; what takes longest is begun first.
+const FROM_HARD_TO_SOFT: [f64; 5] = [900.0, 650.0, 450.0, 300.0, 200.0];
 /// Most steps of a fit.
 const STEPS: usize = 5;
 /// Squares over the least up to which a fit counts as alike.
@@ -33,7 +33,7 @@ pub fn settled(bench: &Bench, held_out: &HeldOut, found: Selection, watch: &Watc
         bench.fit(parts)
     };
     let stage = "letting the flanks meet softer and harder";
-    let mut fits = watch.each(&FROM_SOFT_TO_HARD, (0.9, 0.91), stage, |&hz| {
+    let mut fits = watch.each(&FROM_HARD_TO_SOFT, (0.9, 0.91), stage, |&hz| {
         bench.refine_roughly(with_contact(&found.fit, hz), 0, STEPS)
     })?;
     fits.retain(|fit| is_physical(bench, fit));
@@ -41,17 +41,17 @@ pub fn settled(bench: &Bench, held_out: &HeldOut, found: Selection, watch: &Watc
     fits.sort_by(|a, b| a.squares().total_cmp(&b.squares()));
     let best = fits.remove(0);
     fits.retain(|fit| fit.squares() <= ALIKE * best.squares());
+    // Where a scale tells the table's motion, all predict alike, and the fit stays as it is.
+    if bench.frame.columns.table.is_some() {
+        return Ok(Selection { fit: best, alike: fits, ..found });
+    }
     // Where the best leaves little more than noise, so must what is taken in its place.
     let rattles = Excess::of(bench, &best, &best).largest() > LITTLE_LEFT;
-    let itself_and_others: Vec<Option<f64>> = std::iter::once(None).chain(FROM_SOFT_TO_HARD.map(Some)).collect();
-    let predicted = watch.each(&itself_and_others, (0.91, 0.92), stage, |hz| {
-        let fit = hz.map_or_else(|| best.clone(), |hz| with_contact(&best, hz));
-        let may_be_taken = hz.is_none() || rattles || fit.squares() <= ALIKE * best.squares();
-        (if may_be_taken { held_out.torque_error(&fit) } else { None }, fit)
-    })?;
-    // Where a scale tells the table's motion, all predict alike, and the fit stays as it is.
-    let error = |(error, _): &(Option<f64>, Fit)| error.unwrap_or(f64::INFINITY);
-    let better = predicted.into_iter().reduce(|best, next| if error(&next) < error(&best) { next } else { best });
-    let fit = better.map_or(best, |(_, fit)| fit);
-    Ok(Selection { fit, alike: fits, ..found })
+    let mut taken = watch.each(&FROM_HARD_TO_SOFT, (0.91, 0.92), stage, |&hz| with_contact(&best, hz))?;
+    taken.retain(|fit| rattles || fit.squares() <= ALIKE * best.squares());
+    taken.push(best);
+    let error = |fit: &Fit| held_out.torque_error(fit).unwrap_or(f64::INFINITY);
+    let errors = if taken.len() > 1 { watch.each(&taken, (0.92, 0.92), stage, error)? } else { vec![0.0] };
+    let least = (0..taken.len()).rev().min_by(|&a, &b| errors[a].total_cmp(&errors[b])).unwrap_or(0);
+    Ok(Selection { fit: taken.swap_remove(least), alike: fits, ..found })
 }

@@ -152,7 +152,9 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
     /// [`Stopped`] when the watch's caller said so.
     pub fn errors(&self, fit: &Fit) -> Result<Option<Errors>, Stopped> {
         let Some((observed, servo)) = &self.observed else { return Ok(None) };
-        let machines: Vec<Axis> = (0..2).map(|half| fitted_without(self.kept, self.bench, fit, half)).collect();
+        let mut machines: Vec<Axis> = (0..2).map(|half| fitted_without(self.kept, self.bench, fit, half)).collect();
+        // Without a coefficient both halves have the same one.
+        machines.dedup();
         let of_half =
             self.watch.each(&machines, (0.92, 0.99), "measuring the gain", |axis| errors(axis, observed, servo))?;
         let (Some(Some(even)), Some(Some(odd))) = (of_half.first(), of_half.last()) else { return Ok(None) };

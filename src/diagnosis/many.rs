@@ -19,6 +19,24 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     )
 }
 
+/// Sum of the squares of the differences.
+#[must_use]
+pub fn apart(a: &[f64], b: &[f64]) -> f64 {
+    widest(
+        #[inline(always)]
+        || {
+            let (mut sums, a8, b8) = ([0.0; 8], a.chunks_exact(8), b.chunks_exact(8));
+            let rest: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(x, y)| (x - y) * (x - y)).sum();
+            for (x, y) in a8.zip(b8) {
+                for k in 0..8 {
+                    sums[k] += (x[k] - y[k]) * (x[k] - y[k]);
+                }
+            }
+            sums.iter().sum::<f64>() + rest
+        },
+    )
+}
+
 /// [`dot`] within [`widest`].
 #[inline(always)]
 #[must_use]
@@ -221,6 +239,7 @@ mod tests {
             let (a, b): (Vec<f64>, Vec<f64>) = (0..rows).map(|i| (f64::from(i), f64::from(i * i))).unzip();
             let sum: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
             assert_eq!(dot(&a, &b), sum);
+            assert_eq!(apart(&a, &b), a.iter().zip(&b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>());
             let mut to = a.clone();
             add(&mut to, -2.0, &b);
             assert!(to.iter().zip(&a).zip(&b).all(|((to, a), b)| *to == a - 2.0 * b));

@@ -101,6 +101,12 @@ impl Friction {
         Self::new(stiffness, BristleLaw::default())
     }
 
+    /// Whether it is a bristle by Dahl's law.
+    #[must_use]
+    pub fn is_plain_bristle(&self) -> bool {
+        self.elements.is_none() && self.bristle.curve.exponent == 1.0
+    }
+
     /// Speed after a step of `h` seconds, from the speed `v` before it.
     ///
     /// `mass`·v′ = `impulse` − h·F with |F| up to `level`; mass and impulse hold all else that acts.

@@ -207,6 +207,34 @@ impl Physics {
         self.level(v, t, fading, spots, fading)
     }
 
+    /// That level at many places and speeds, and the time of each; `fade` makes e^−squareⁿ of squares, n being half of an exponent, as exactly as its
+    /// caller needs.
+    #[must_use]
+    pub fn friction_levels(
+        &self,
+        x: &[f64],
+        v: &[f64],
+        t: impl Fn(usize) -> f64,
+        fade: impl Fn(&mut [f64], f64),
+    ) -> Vec<f64> {
+        let mut levels = vec![self.coulomb; v.len()];
+        let mut add = |mut squares: Vec<f64>, n: f64, size: f64, less: f64| {
+            fade(&mut squares, n);
+            levels.iter_mut().zip(&squares).for_each(|(level, share)| *level += size * share - less);
+        };
+        if let Some(Stribeck { torque, per_velocity, half_exponent }) = self.stribeck {
+            add(v.iter().map(|v| (v * per_velocity).powi(2)).collect(), half_exponent, torque, 0.0);
+        }
+        for &Spot { centre, peak, per_width, half_steepness } in &self.spots {
+            add(x.iter().map(|x| ((x - centre) * per_width).powi(2)).collect(), half_steepness, peak, 0.0);
+        }
+        if let Some((drop, per_time, left)) = self.drift {
+            add((0..v.len()).map(|row| t(row) * per_time).collect(), 1.0, drop, left);
+        }
+        levels.iter_mut().for_each(|level| *level = level.max(0.0));
+        levels
+    }
+
     /// That level by what fades with speed, what tight spots add, and what fades with time.
     #[inline(always)]
     pub(super) fn level(
@@ -392,6 +420,24 @@ mod tests {
         near(p.table_of(200.0), 200.01);
         let p = physics(r#"{"cause":"screw_periodic_error","parameters":{"amplitude_um":4,"period_mm":10}}"#);
         near(p.table_of(2.5), 2.504);
+    }
+
+    #[test]
+    fn many_levels_are_those_of_each() {
+        let p = physics(
+            r#"{"cause":"stribeck_friction","parameters":{"stribeck_torque_nm":-0.6,"stribeck_velocity_mm_s":5,"stribeck_exponent":1.4}},
+               {"cause":"position_dependent_friction","parameters":{"centre_mm":100,"peak_nm":0.3,"width_mm":7,"steepness":8}},
+               {"cause":"thermal_drift","parameters":{"drop_nm":0.3,"time_constant_s":20,"until_s":200}}"#,
+        );
+        let rows: Vec<f64> = (0..200).map(f64::from).collect();
+        let of = |scale: f64, zero: f64| rows.iter().map(|row| scale * row - zero).collect::<Vec<f64>>();
+        let (x, v, t) = (of(1.0, 0.0), of(0.3, 20.0), of(1.1, 0.0));
+        let levels =
+            p.friction_levels(&x, &v, |i| t[i], |squares, n| squares.iter_mut().for_each(|s| *s = (-s.powf(n)).exp()));
+        for i in 0..rows.len() {
+            let own = p.friction_level(x[i], v[i], t[i]);
+            assert!((levels[i] - own).abs() < 1e-12, "row {i}: {} is not {own}", levels[i]);
+        }
     }
 
     #[test]

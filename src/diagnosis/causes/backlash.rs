@@ -27,10 +27,7 @@ pub static LAW: Law = Law {
         valleys: |shape| shape.first().map_or_else(Vec::new, |width| of_width(*width).collect()),
         ..PLAIN
     },
-    terms: Terms::Simulated(|frame, resistance, shapes| {
-        let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(shape)).collect();
-        table_side::terms(frame, resistance, &effects)
-    }),
+    terms: Terms::Simulated(|_, shape| effect(shape)),
     // Within three steps of the encoder a turn is no crossing.
     effect: |frame, shape, _| effect(shape).filter(|_| shape.first().is_some_and(|width| *width > 3e3 * frame.grid)),
     confused_with: &[Cause::PreslidingFriction, Cause::DriveCompliance],

@@ -6,7 +6,6 @@
 //! whatever is changed of one of them, the best of the others stays about where it is. By the resonance, which moves with every
 //! mass, the way down is a bent valley.
 
-use super::table_side;
 use super::*;
 use crate::diagnosis::many::dot;
 use std::f64::consts::TAU;
@@ -79,7 +78,7 @@ pub static LAW: Law = Law {
         damped,
         ..PLAIN
     },
-    terms: Terms::Simulated(terms),
+    terms: Terms::Simulated(effect),
     effect: swinging,
     confused_with: CONFUSED_WITH,
     sentence,
@@ -102,18 +101,13 @@ pub static BY_MEANS: Law = Law {
         taken: &[(1, 0.2), (3, 0.5 * DAMPING_BY_MEANS)],
         ..PLAIN
     },
-    terms: Terms::Simulated(terms),
+    terms: Terms::Simulated(effect),
     effect: swinging,
     confused_with: CONFUSED_WITH,
     sentence,
 };
 
 const CONFUSED_WITH: &[Cause] = &[Cause::InertiaMismatch, Cause::Backlash, Cause::PreslidingFriction];
-
-fn terms(frame: &Frame, resistance: &Resistance, shapes: &[Vec<f64>]) -> Vec<Term> {
-    let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(frame, shape)).collect();
-    table_side::terms(frame, resistance, &effects)
-}
 
 /// The effect, if it is one of a drive that swings.
 fn swinging(frame: &Frame, shape: &[f64], _: &[f64]) -> Option<Effect> {

@@ -134,8 +134,8 @@ const PLAIN: Manner = Manner {
 pub enum Terms {
     /// Worked out row by row.
     ByRows(fn(&Frame, &[Vec<f64>]) -> Vec<Term>),
-    /// Simulated between the rows, under what resists the table.
-    Simulated(fn(&Frame, &Resistance, &[Vec<f64>]) -> Vec<Term>),
+    /// Simulated between the rows under what resists the table: an effect that parts it from the motor, by its non-linear parameters.
+    Simulated(fn(&Frame, &[f64]) -> Option<Effect>),
 }
 
 /// One cause.
@@ -164,7 +164,19 @@ impl Law {
     pub fn terms(&self, frame: &Frame, resistance: &Resistance, shapes: &[Vec<f64>]) -> Vec<Term> {
         match self.terms {
             Terms::ByRows(terms) => terms(frame, shapes),
-            Terms::Simulated(terms) => terms(frame, resistance, shapes),
+            Terms::Simulated(effect) => {
+                let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(frame, shape)).collect();
+                table_side::terms(frame, resistance, &effects)
+            }
+        }
+    }
+
+    /// The traces of a simulated table under each of these resistances.
+    #[must_use]
+    pub fn terms_under_each(&self, frame: &Frame, resistances: &[&Resistance], shape: &[f64]) -> Vec<Term> {
+        match self.terms {
+            Terms::ByRows(terms) => resistances.iter().flat_map(|_| terms(frame, &[shape.to_vec()])).collect(),
+            Terms::Simulated(effect) => table_side::terms_under_each(frame, resistances, effect(frame, shape)),
         }
     }
 

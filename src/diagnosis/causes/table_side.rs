@@ -8,6 +8,7 @@
 //! looks like another inertia. The motion is as the encoder shows it: what smooths it takes the impacts off, and the table's
 //! torque comes out too small.
 
+mod bristles;
 mod flanks;
 mod resistance;
 mod spring;
@@ -18,7 +19,8 @@ use super::*;
 use crate::diagnosis::many::widest;
 use crate::diagnosis::sampling::NUMEROV;
 use crate::machine::TwoMasses;
-use crate::plant::friction::Friction;
+use bristles::Bristles;
+use resistance::{Alike, Each, Resisted};
 use spring::MOST_STEPS;
 use std::cell::RefCell;
 use std::f64::consts::TAU;
@@ -26,8 +28,25 @@ use std::ops::Range;
 
 /// The traces in the torque (against the rigid axis) and in table − encoder, of each effect.
 pub fn terms(frame: &Frame, resistance: &Resistance, effects: &[Option<Effect>]) -> Vec<Term> {
-    let split = |e: &Option<Effect>| e.and_then(|e| frame.axis.with_effects(vec![e]).two_masses().ok().flatten());
-    terms_of(frame, resistance, &effects.iter().map(split).collect::<Vec<_>>())
+    terms_of(frame, resistance, &effects.iter().map(|effect| split(frame, *effect)).collect::<Vec<_>>())
+}
+
+/// The same of one effect under each of these resistances.
+pub fn terms_under_each(frame: &Frame, resistances: &[&Resistance], effect: Option<Effect>) -> Vec<Term> {
+    let Some(masses) = split(frame, effect) else { return vec![Term::default(); resistances.len()] };
+    let together = |some: &[&Resistance]| match some {
+        [one] => Tables::<1, _>::new(frame, Alike(one), &[masses]).terms(1),
+        several => {
+            let own: [&Resistance; FEW] = std::array::from_fn(|l| several[l.min(several.len() - 1)]);
+            Tables::<FEW, _>::new(frame, Each(own), &[masses]).terms(several.len())
+        }
+    };
+    resistances.chunks(FEW).flat_map(together).collect()
+}
+
+/// Motor and table of an axis with an effect.
+fn split(frame: &Frame, effect: Option<Effect>) -> Option<TwoMasses> {
+    frame.axis.with_effects(vec![effect?]).two_masses().ok().flatten()
 }
 
 /// The trace of what an axis is believed to have between motor and table; `None` where that is nothing.
@@ -60,8 +79,8 @@ pub fn open_damping(frame: &Frame, effect: &Effect) -> f64 {
 fn terms_of(frame: &Frame, resistance: &Resistance, splits: &[Option<TwoMasses>]) -> Vec<Term> {
     let sound: Vec<TwoMasses> = splits.iter().copied().flatten().collect();
     let together = |masses: &[TwoMasses]| match masses {
-        [one] => Tables::<1>::new(frame, resistance, std::slice::from_ref(one)).terms(1),
-        several => Tables::<LANES>::new(frame, resistance, several).terms(several.len()),
+        [one] => Tables::<1, _>::new(frame, Alike(resistance), std::slice::from_ref(one)).terms(1),
+        several => Tables::<LANES, _>::new(frame, Alike(resistance), several).terms(several.len()),
     };
     let mut found = sound.chunks(LANES).flat_map(together).collect::<Vec<_>>().into_iter();
     splits.iter().map(|split| split.and_then(|_| found.next()).unwrap_or_default()).collect()
@@ -70,6 +89,8 @@ fn terms_of(frame: &Frame, resistance: &Resistance, splits: &[Option<TwoMasses>]
 /// Tables that are simulated side by side: each step waits for the one before it, so that several cost little more than one.
 /// A table by itself is simulated by itself.
 const LANES: usize = 8;
+/// The same under resistances of their own, which a row has to fetch for each.
+const FEW: usize = 4;
 /// Radians of the fastest swing to a step: of a spring, whose swing is all that there is, and of flanks.
 const STEP_RAD: [f64; 2] = [0.12, 0.35];
 /// Radians of a table's swing on the bristles of its friction over which their torque may be taken from half way.
@@ -82,7 +103,7 @@ thread_local! {
 }
 
 #[inline(always)]
-fn lanes<const N: usize>(value: impl Fn(usize) -> f64) -> [f64; N] {
+fn lanes<const N: usize>(mut value: impl FnMut(usize) -> f64) -> [f64; N] {
     // A plain loop is inlined at any length, `array::from_fn` is not.
     let mut lanes = [0.0; N];
     for l in 0..N {
@@ -92,9 +113,9 @@ fn lanes<const N: usize>(value: impl Fn(usize) -> f64) -> [f64; N] {
 }
 
 /// Tables behind one motor that moves as measured; motor's coordinate.
-struct Tables<'a, const N: usize> {
+struct Tables<'a, const N: usize, R> {
     frame: &'a Frame<'a>,
-    resistance: &'a Resistance,
+    resistance: R,
     inertia: [f64; N],
     motor_inertia: [f64; N],
     /// Share of friction.
@@ -113,7 +134,7 @@ struct Tables<'a, const N: usize> {
     mobility: [f64; N],
     kept: [f64; N],
     /// How friction builds up on the tables' own way, of a table with all of it, where a step is short beside that way.
-    bristle: Option<Friction>,
+    bristles: Option<Bristles<N>>,
     /// Whether there is a dead zone: flanks push and never pull.
     flanks: bool,
 }
@@ -122,7 +143,7 @@ struct Tables<'a, const N: usize> {
 struct Resisting<const N: usize> {
     load: [f64; N],
     friction: [f64; N],
-    level: f64,
+    level: [f64; N],
 }
 
 /// The way of the motor from a row to the next: value and derivatives of the cubic by shares of the time between them.
@@ -148,8 +169,8 @@ impl Way {
     }
 }
 
-impl<'a, const N: usize> Tables<'a, N> {
-    fn new(frame: &'a Frame<'a>, resistance: &'a Resistance, masses: &[TwoMasses]) -> Self {
+impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
+    fn new(frame: &'a Frame<'a>, resistance: R, masses: &[TwoMasses]) -> Self {
         // Lanes without a table of their own repeat the last.
         let of = |value: fn(&TwoMasses) -> f64| lanes(|l| masses.get(l).or(masses.last()).map_or(1.0, value));
         let share = of(|m| m.table_friction_share);
@@ -170,7 +191,8 @@ impl<'a, const N: usize> Tables<'a, N> {
         let lightest =
             masses.iter().map(|m| m.table_inertia / m.table_friction_share.max(1e-9)).fold(f64::MAX, f64::min);
         let piece_s = if flanks { step_s } else { frame.columns.period_s / pieces };
-        let swings_slower = |stiffness: f64| (stiffness / lightest).sqrt() * piece_s < MOST_BRISTLE_RAD;
+        let swings_slower = |(_, stiffness): &(_, f64)| (stiffness / lightest).sqrt() * piece_s < MOST_BRISTLE_RAD;
+        let viscous = resistance.each(|r| r.viscous);
         Self {
             frame,
             resistance,
@@ -185,11 +207,11 @@ impl<'a, const N: usize> Tables<'a, N> {
             steps: steps as usize,
             step_s,
             mobility,
-            kept: lanes(|l| 1.0 - mobility[l] * share[l] * resistance.viscous),
-            bristle: resistance
-                .bristle
-                .filter(|(_, stiffness)| swings_slower(*stiffness))
-                .map(|(friction, _)| friction),
+            kept: lanes(|l| 1.0 - mobility[l] * share[l] * viscous[l]),
+            bristles: resistance
+                .bristles()
+                .filter(|bristles| bristles.iter().all(swings_slower))
+                .map(|bristles| Bristles::new(bristles.map(|(friction, _)| friction))),
             flanks,
         }
     }
@@ -224,16 +246,18 @@ impl<'a, const N: usize> Tables<'a, N> {
 
     /// What resists the motion of a rigid axis at a row, by a speed: friction of which the tables have their share, and load.
     #[inline(always)]
-    fn resisting(&self, i: usize, speed: f64) -> (f64, f64) {
-        let r = self.resistance;
-        (r.dry[i] + r.viscous * speed * self.frame.unit + r.even[i], r.load[i])
+    fn resisting(&self, i: usize, speed: f64) -> ([f64; N], [f64; N]) {
+        let speed = speed * self.frame.unit;
+        (self.resistance.each(|r| r.dry[i] + r.viscous * speed + r.even[i]), self.resistance.each(|r| r.load[i]))
     }
 
     /// What resists the tables at a row.
     #[inline(always)]
     fn resisting_tables(&self, i: usize) -> Resisting<N> {
-        let (even, load, level) = (self.resistance.even[i], self.resistance.load[i], self.resistance.level[i]);
-        Resisting { load: lanes(|l| load + self.share[l] * even), friction: lanes(|l| self.share[l] * level), level }
+        let [even, load] = [self.resistance.each(|r| r.even[i]), self.resistance.each(|r| r.load[i])];
+        let level = self.resistance.each(|r| r.level[i]);
+        let friction = lanes(|l| self.share[l] * level[l]);
+        Resisting { load: lanes(|l| load[l] + self.share[l] * even[l]), friction, level }
     }
 
     /// Torque that the link of a rigid axis carries at a row.
@@ -241,7 +265,7 @@ impl<'a, const N: usize> Tables<'a, N> {
     fn carried(&self, i: usize) -> [f64; N] {
         let acceleration = self.frame.a[i] * self.frame.unit;
         let (friction, load) = self.resisting(i, self.frame.v[i]);
-        lanes(|l| self.inertia[l] * acceleration + self.share[l] * friction + load)
+        lanes(|l| self.inertia[l] * acceleration + self.share[l] * friction[l] + load[l])
     }
 
     /// Torque that the links carry where rows begin: that of a rigid axis, or, of an axis that rests there, what the motor gives as far
@@ -250,7 +274,7 @@ impl<'a, const N: usize> Tables<'a, N> {
         let (first, frame) = (rows.start, self.frame);
         let resting = rows.take_while(|i| frame.direction[*i] == 0.0).map(|i| frame.columns.torque[i]);
         let (count, sum) = resting.fold((0.0, 0.0), |(count, sum), torque| (count + 1.0, sum + torque));
-        if count == 0.0 || self.bristle.is_some() {
+        if count == 0.0 || self.bristles.is_some() {
             return self.carried(first);
         }
         let Resisting { load, friction, .. } = self.resisting_tables(first);
@@ -266,20 +290,16 @@ impl<'a, const N: usize> Tables<'a, N> {
         let speed = |i: usize| self.frame.raw_speed[i];
         let ((here, load), (next, next_load)) = (self.resisting(i, speed(i)), self.resisting(i + 1, speed(i + 1)));
         let [side, middle] = [NUMEROV[0], 0.5 * NUMEROV[1]];
-        let share = |acceleration: f64, friction: f64, load: f64| {
-            lanes(|l| self.inertia[l] * acceleration * unit + self.share[l] * friction + load)
+        let share = |acceleration: f64, [of_here, of_next]: [f64; 2]| {
+            lanes(|l| {
+                let friction = of_here * here[l] + of_next * next[l];
+                let load = of_here * load[l] + of_next * next_load[l];
+                self.inertia[l] * acceleration * unit + self.share[l] * friction + load
+            })
         };
         [
-            share(
-                (step - span * speed(i)) / (span * span),
-                middle * here + side * next,
-                middle * load + side * next_load,
-            ),
-            share(
-                (span * speed(i + 1) - step) / (span * span),
-                side * here + middle * next,
-                side * load + middle * next_load,
-            ),
+            share((step - span * speed(i)) / (span * span), [middle, side]),
+            share((span * speed(i + 1) - step) / (span * span), [side, middle]),
         ]
     }
 

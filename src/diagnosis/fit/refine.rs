@@ -4,11 +4,16 @@
 //! A table behind a spring or a clearance moves under all the friction and load that a set of causes has, so that its trace goes
 //! with the numbers of the others. It is simulated anew wherever those have moved: a fit and its table are at one.
 
-use super::{Bench, Fit, Part};
+use super::{Bench, Fit, Part, Slope};
 use crate::diagnosis::causes::Resistance;
 use crate::diagnosis::progress::{Stopped, Watch};
 use crate::machine::{Cause, Effect};
 use std::sync::Arc;
+
+/// Shares of a step that are tried.
+const SHARES: [f64; 4] = [1.0, 0.3, 0.09, 0.027];
+/// Share of what the step before took off that one by the same slopes must for another to be made by them.
+const FAIR: f64 = 0.3;
 
 impl Bench<'_, '_> {
     /// Refines the non-linear parameters of the parts from index `first` on, until a step brings nothing.
@@ -40,50 +45,65 @@ impl Bench<'_, '_> {
 
     fn refine_while(&self, fit: Fit, first: usize, most: usize, least: f64, look_about: impl Fn(&Fit)) -> Fit {
         let mut fit = self.at_one(fit);
-        for _ in 0..most {
+        let mut steps = 0;
+        while steps < most {
             look_about(&fit);
             let slopes = self.open_slopes(&fit, first);
             if slopes.is_empty() {
                 break;
             }
-            let steps = self.steps(&fit, &slopes);
-            let before = fit.squares();
-            let mut share = 1.0;
-            let mut better = None;
-            for _ in 0..4 {
-                let mut parts = fit.parts.clone();
-                let mut moved: Vec<usize> = Vec::new();
-                for (slope, step) in slopes.iter().zip(&steps) {
-                    let part = &mut parts[slope.part];
-                    let scale = part.law.scales[slope.index];
-                    part.shape[slope.index] = scale.moved(part.shape[slope.index], share * step);
-                    moved.push(slope.part);
-                }
-                moved.dedup();
-                let resistance = match fit.table() {
-                    Some(_) => self.resistance_by(&parts, &fit.coefficients),
-                    None => self.resistance.clone(),
-                };
-                for (i, part) in parts.iter_mut().enumerate() {
-                    if moved.contains(&i) || moves_otherwise(part, &resistance) {
-                        *part = self.parts_under(part.law, vec![part.shape.clone()], &resistance).swap_remove(0);
-                    }
-                }
-                let next = self.fit(parts);
-                if next.squares() < before {
-                    better = Some(next);
-                    break;
-                }
-                share *= 0.3;
-            }
-            let Some(next) = better else { break };
-            let gained = 1.0 - next.squares() / before;
+            let Some(next) = self.stepped(&fit, &slopes, &SHARES) else { break };
+            let gained = 1.0 - next.squares() / fit.squares();
             fit = self.at_one(next);
             if gained < least {
                 break;
             }
+            steps += 1;
+            // Slopes are most of the work, and at a new place not far from what they were: as long as a step by them takes off a fair
+            // share of what the one before did, they do for another (chord method).
+            let mut gained = gained;
+            while steps < most {
+                let Some(next) = self.stepped(&fit, &slopes, &SHARES[..1]) else { break };
+                let more = 1.0 - next.squares() / fit.squares();
+                if more < least {
+                    break;
+                }
+                fit = self.at_one(next);
+                steps += 1;
+                if more < FAIR * gained {
+                    break;
+                }
+                gained = more;
+            }
         }
         fit
+    }
+
+    /// A fit moved along slopes by the largest of these shares of a step that leaves less.
+    fn stepped(&self, fit: &Fit, slopes: &[Slope], shares: &[f64]) -> Option<Fit> {
+        let steps = self.steps(fit, slopes);
+        let moved = |share: &f64| {
+            let mut parts = fit.parts.clone();
+            let mut moved: Vec<usize> = Vec::new();
+            for (slope, step) in slopes.iter().zip(&steps) {
+                let part = &mut parts[slope.part];
+                let scale = part.law.scales[slope.index];
+                part.shape[slope.index] = scale.moved(part.shape[slope.index], share * step);
+                moved.push(slope.part);
+            }
+            moved.dedup();
+            let resistance = match fit.table() {
+                Some(_) => self.resistance_by(&parts, &fit.coefficients),
+                None => self.resistance.clone(),
+            };
+            for (i, part) in parts.iter_mut().enumerate() {
+                if moved.contains(&i) || moves_otherwise(part, &resistance) {
+                    *part = self.parts_under(part.law, vec![part.shape.clone()], &resistance).swap_remove(0);
+                }
+            }
+            self.fit(parts)
+        };
+        shares.iter().map(moved).find(|next| next.squares() < fit.squares())
     }
 
     /// What resists the table of a fit, by the belief and its causes.

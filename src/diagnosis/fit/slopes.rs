@@ -44,30 +44,36 @@ impl Bench<'_, '_> {
 
     fn slopes_of(&self, fit: &Fit, first: usize, open: impl Fn(&Part) -> bool) -> Vec<Slope> {
         let parts = fit.parts.iter().enumerate().skip(first).filter(|(_, part)| open(part));
-        parts
-            .flat_map(|(i, part)| {
-                let table = fit.table().filter(|_| part.law.manner.turns_table).map(|at| &fit.parts[at]);
-                let slope = |side: &Side| {
-                    let mut slope = self.slope(i, &fit.coefficients[i], side)?;
-                    let way =
-                        table.map(|table| [&side.up, &side.down].map(|part| self.table_beside(fit, i, part, table)));
-                    if let Some([Some(up), Some(down)]) = way {
-                        add(&mut slope.column, 1.0 / side.apart, &up);
-                        add(&mut slope.column, -1.0 / side.apart, &down);
-                    }
-                    Some(slope)
-                };
-                self.both_sides(part).iter().filter_map(slope).collect::<Vec<_>>()
-            })
-            .collect()
+        let sides = parts.flat_map(|(i, part)| self.both_sides(part).iter().map(move |side| (i, side)));
+        let found = sides.filter_map(|(i, side)| Some((side, self.slope(i, &fit.coefficients[i], side)?)));
+        let (sides, mut slopes): (Vec<&Side>, Vec<Slope>) = found.unzip();
+        if let Some(table) = fit.table().map(|at| &fit.parts[at]) {
+            let turning =
+                slopes.iter_mut().zip(sides).filter(|(slope, _)| fit.parts[slope.part].law.manner.turns_table);
+            let turning: Vec<(&mut Slope, &Side)> = turning.collect();
+            let beside = turning.iter().flat_map(|(slope, side)| [&side.up, &side.down].map(|part| (slope.part, part)));
+            let ways = self.tables_beside(fit, &beside.collect::<Vec<_>>(), table);
+            for ((slope, side), way) in turning.into_iter().zip(ways.chunks(2)) {
+                if let [Some(up), Some(down)] = way {
+                    add(&mut slope.column, 1.0 / side.apart, up);
+                    add(&mut slope.column, -1.0 / side.apart, down);
+                }
+            }
+        }
+        slopes
     }
 
-    /// The trace of a simulated table with another in place of part `i`.
-    fn table_beside(&self, fit: &Fit, i: usize, part: &Part, table: &Part) -> Option<Arc<[f64]>> {
-        let mut parts = fit.parts.clone();
-        parts[i] = part.clone();
-        let resistance = self.resistance_by(&parts, &fit.coefficients);
-        self.parts_under(table.law, vec![table.shape.clone()], &resistance).swap_remove(0).fixed
+    /// The traces of a simulated table, each with another part in the place of one.
+    fn tables_beside(&self, fit: &Fit, others: &[(usize, &Part)], table: &Part) -> Vec<Option<Arc<[f64]>>> {
+        let resisting = |&(i, part): &(usize, &Part)| {
+            let mut parts = fit.parts.clone();
+            parts[i] = part.clone();
+            self.resistance_by(&parts, &fit.coefficients)
+        };
+        let resistances: Vec<_> = others.iter().map(resisting).collect();
+        let each: Vec<_> = resistances.iter().map(Arc::as_ref).collect();
+        let terms = table.law.terms_under_each(self.frame, &each, &table.shape);
+        terms.into_iter().map(|term| term.fixed.map(|trace| self.stack(&trace).into())).collect()
     }
 
     /// The step of each non-linear parameter that takes most off the squares. What the rows do not tell stays where it is: they

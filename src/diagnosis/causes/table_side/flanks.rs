@@ -19,12 +19,12 @@ struct State<const N: usize> {
     /// How the motor has given way.
     given: [[f64; N]; 3],
     /// How friction has built up on the way of each, where it does.
-    bristles: Option<[Friction; N]>,
+    bristles: Option<Bristles<N>>,
     /// Not known to move with the motor.
     loose: [bool; N],
 }
 
-impl<const N: usize> Tables<'_, N> {
+impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
     #[inline(always)]
     pub(super) fn behind_flanks(&self, rows: Range<usize>, extra: &mut [[f64; N]], lag: &mut [[f64; N]]) {
         let unit = self.frame.unit;
@@ -39,11 +39,11 @@ impl<const N: usize> Tables<'_, N> {
             together: [0; N],
             side: [0.0; N],
             given: [[0.0; N]; 3],
-            bristles: self.bristle.map(|at_rest| [at_rest; N]),
+            bristles: self.bristles,
             loose: [false; N],
         };
         // Where a table moves with the motor its friction has built up as the motor's way has it.
-        let mut with_motor = self.bristle;
+        let mut with_motor = self.bristles;
         let mut any = false;
         extra[rows.start] = [0.0; N];
         if let Some(last) = lag.get_mut(rows.end - 1) {
@@ -54,16 +54,17 @@ impl<const N: usize> Tables<'_, N> {
             let next = self.carried(i + 1);
             let motor = self.frame.columns.position[i] * unit;
             let steady = i > rows.start && self.frame.direction[i] * self.frame.direction[i + 1] > 0.5;
-            let level = self.resistance.level[i];
-            if let Some(friction) = with_motor.as_mut().filter(|_| i > rows.start) {
-                friction.moved((self.frame.columns.position[i] - self.frame.columns.position[i - 1]) * unit, level);
+            let level = self.resistance.each(|r| r.level[i]);
+            if let Some(bristles) = with_motor.as_mut().filter(|_| i > rows.start) {
+                let way = (self.frame.columns.position[i] - self.frame.columns.position[i - 1]) * unit;
+                bristles.moved_together(way, level, R::DISTINCT);
             }
             let mut firm = [false; N];
             let mut all_firm = steady;
             for l in 0..N {
                 let both = smaller(load[l].abs(), next[l].abs());
                 // Near no load the flanks may part within the row.
-                firm[l] = steady & (both > 0.1 * self.share[l] * level) & (load[l] * next[l] > 0.0);
+                firm[l] = steady & (both > 0.1 * self.share[l] * level[l]) & (load[l] * next[l] > 0.0);
                 all_firm &= firm[l];
             }
             // In most rows of most tables this is all.
@@ -83,8 +84,8 @@ impl<const N: usize> Tables<'_, N> {
                     state.speed[l] = self.frame.raw_speed[i] * unit;
                     state.together[l] = 0;
                     (state.given[0][l], state.given[1][l], state.given[2][l]) = (0.0, 0.0, load[l]);
-                    if let (Some(bristles), Some(friction)) = (&mut state.bristles, with_motor) {
-                        bristles[l] = friction;
+                    if let (Some(bristles), Some(with_motor)) = (&mut state.bristles, &with_motor) {
+                        bristles.take(l, with_motor);
                     }
                 }
                 state.loose[l] = !(firm && held);
@@ -114,18 +115,19 @@ impl<const N: usize> Tables<'_, N> {
         let mut bristles = state.bristles.take();
         let shared = match &mut bristles {
             // Dry friction takes what speed it can, and never turns it.
-            None => {
-                self.stepping(row, yielding, state, &resisting, |l, free, _| larger(smaller(free, dry[l]), -dry[l]))
-            }
-            Some(bristles) => self.stepping(row, yielding, state, &resisting, |l, _, v| {
-                self.mobility[l] * self.share[l] * bristles[l].moved(self.step_s * v, resisting.level)
+            None => self.stepping(row, yielding, state, &resisting, |free, _| {
+                lanes(|l| larger(smaller(free[l], dry[l]), -dry[l]))
+            }),
+            Some(bristles) => self.stepping(row, yielding, state, &resisting, |_, v| {
+                let torque = bristles.moved(v.map(|v| self.step_s * v), resisting.level);
+                lanes(|l| self.mobility[l] * self.share[l] * torque[l])
             }),
         };
         state.bristles = bristles;
         shared
     }
 
-    /// The same by what `rub` takes off the speed that a table would have, from the one that it had.
+    /// The same by what `rub` takes off the speeds that the tables would have, from those that they had.
     #[inline(always)]
     fn stepping(
         &self,
@@ -133,7 +135,7 @@ impl<const N: usize> Tables<'_, N> {
         yielding: Giving,
         state: &mut State<N>,
         resisting: &Resisting<N>,
-        mut rub: impl FnMut(usize, f64, f64) -> f64,
+        mut rub: impl FnMut([f64; N], [f64; N]) -> [f64; N],
     ) -> [[f64; N]; 2] {
         let way = self.way(row);
         let (per_step, per_span) = (1.0 / self.steps as f64, 1.0 / self.frame.columns.period_s);
@@ -149,6 +151,7 @@ impl<const N: usize> Tables<'_, N> {
         for step in 0..self.steps {
             let s = (step as f64 + 0.5) * per_step;
             let (motor, speed) = (way.position(s), way.speed(s) * per_span);
+            let mut free = [0.0; N];
             for l in 0..N {
                 let wind = (motor + give[l]) - middle[l];
                 // Flanks push and never pull.
@@ -161,8 +164,11 @@ impl<const N: usize> Tables<'_, N> {
                     yielding.step([give[l], giving[l], answered[l]], push, motor_mobility[l]);
                 sum[l] += push;
                 far[l] += s * push;
-                let free = (self.kept[l] * v[l] - pull[l]) + self.mobility[l] * push;
-                v[l] = free - rub(l, free, v[l]);
+                free[l] = (self.kept[l] * v[l] - pull[l]) + self.mobility[l] * push;
+            }
+            let rubbed = rub(free, v);
+            for l in 0..N {
+                v[l] = free[l] - rubbed[l];
                 middle[l] += self.step_s * v[l];
             }
         }

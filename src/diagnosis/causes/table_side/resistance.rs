@@ -2,8 +2,10 @@
 //! crossed, by all the friction that there is, not by that of the belief alone: behind a drive whose friction rises by a third the
 //! table lags by a third more.
 
+use super::lanes;
 use crate::diagnosis::belief;
 use crate::diagnosis::frame::Frame;
+use crate::diagnosis::many::{apart, decay, dot, to_the_power, widest};
 use crate::machine::{Axis, Effect};
 use crate::plant::friction::Friction;
 use crate::plant::physics::Physics;
@@ -97,18 +99,80 @@ impl Resistance {
     /// Whether a table moves under this as under another.
     #[must_use]
     pub fn is_like(&self, other: &Self) -> bool {
-        let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-        let size = |a: &[f64]| a.iter().map(|a| a * a).sum::<f64>();
-        let all = size(&self.dry) + size(&self.load);
-        apart(&self.dry, &other.dry) + apart(&self.load, &other.load) <= ALIKE * ALIKE * all
-            && (self.viscous - other.viscous).abs() <= ALIKE * self.viscous.abs()
+        let all = dot(&self.dry, &self.dry) + dot(&self.load, &self.load);
+        (self.viscous - other.viscous).abs() <= ALIKE * self.viscous.abs()
             && self.bristle.is_some() == other.bristle.is_some()
+            && apart(&self.dry, &other.dry) + apart(&self.load, &other.load) <= ALIKE * ALIKE * all
+    }
+}
+
+/// What resists each of several tables.
+pub(super) trait Resisted<const N: usize>: Copy {
+    /// How many of them differ in it.
+    const DISTINCT: usize;
+
+    /// A number of each.
+    fn each(self, of: impl Fn(&Resistance) -> f64) -> [f64; N];
+
+    /// How the friction of each builds up, where all does.
+    fn bristles(self) -> Option<[(Friction, f64); N]>;
+}
+
+/// The same resists all of them.
+#[derive(Clone, Copy)]
+pub(super) struct Alike<'r>(pub &'r Resistance);
+
+impl<const N: usize> Resisted<N> for Alike<'_> {
+    const DISTINCT: usize = 1;
+
+    #[inline(always)]
+    fn each(self, of: impl Fn(&Resistance) -> f64) -> [f64; N] {
+        [of(self.0); N]
+    }
+
+    fn bristles(self) -> Option<[(Friction, f64); N]> {
+        self.0.bristle.map(|bristle| [bristle; N])
+    }
+}
+
+/// Each is resisted by what is its own.
+#[derive(Clone, Copy)]
+pub(super) struct Each<'r, const N: usize>(pub [&'r Resistance; N]);
+
+impl<const N: usize> Resisted<N> for Each<'_, N> {
+    const DISTINCT: usize = N;
+
+    #[inline(always)]
+    fn each(self, of: impl Fn(&Resistance) -> f64) -> [f64; N] {
+        lanes(|l| of(self.0[l]))
+    }
+
+    fn bristles(self) -> Option<[(Friction, f64); N]> {
+        let first = self.0[0].bristle?;
+        let mut all = [first; N];
+        for (own, resistance) in all.iter_mut().zip(self.0) {
+            *own = resistance.bristle?;
+        }
+        Some(all)
     }
 }
 
 /// Largest dry friction at each row, at speeds in load units/s.
 pub fn level(frame: &Frame, physics: &Physics, v: &[f64]) -> Vec<f64> {
-    (0..v.len()).map(|i| physics.friction_level(frame.x[i], v[i], frame.seconds(i))).collect()
+    physics.friction_levels(
+        &frame.x,
+        v,
+        |row| frame.seconds(row),
+        |squares, n| {
+            if n != 1.0 {
+                to_the_power(squares, n);
+            }
+            widest(
+                #[inline(always)]
+                || squares.iter_mut().for_each(|square| *square = decay(*square)),
+            );
+        },
+    )
 }
 
 /// Dry friction of the measured motion at each row, with its level there.
@@ -125,6 +189,32 @@ pub fn built_up(
 ) -> Vec<f64> {
     let x = &frame.columns.position;
     let mut dry: Vec<f64> = at_once(frame, level).collect();
+    if at_rest.is_plain_bristle() {
+        // What a step leaves of the way to the level waits for no other step.
+        let stiffness = at_rest.bristle.stiffness * frame.unit;
+        let mut left = vec![1.0; x.len()];
+        widest(
+            #[inline(always)]
+            || {
+                for ((left, pair), level) in left.iter_mut().skip(1).zip(x.windows(2)).zip(level.iter().skip(1)) {
+                    let by = stiffness * (pair[1] - pair[0]).abs();
+                    *left = if *level > 0.0 { decay(by / level) } else { 0.0 };
+                }
+            },
+        );
+        for stretch in &frame.columns.stretches {
+            let mut friction = at_rest;
+            for i in stretch.clone().skip(1) {
+                let end = level[i].copysign(x[i] - x[i - 1]);
+                let side = 1.0f64.copysign(end);
+                // A level that has fallen below the torque holds no more than itself.
+                let to_go = ((end - friction.bristle.force) * side).max(0.0);
+                friction.bristle.force = end - side * to_go * left[i];
+                dry[i] = friction.bristle.force + more(&mut friction, i);
+            }
+        }
+        return dry;
+    }
     for stretch in &frame.columns.stretches {
         let mut friction = at_rest;
         for i in stretch.clone().skip(1) {

@@ -56,7 +56,7 @@ pub(super) struct Sliding<const N: usize> {
     far: Made<N>,
 }
 
-impl<const N: usize> Tables<'_, N> {
+impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
     /// Works out what the steps make of tables that slide.
     pub(super) fn sliding(&self) -> Sliding<N> {
         let steps = self.steps / self.pieces;
@@ -95,7 +95,7 @@ impl<const N: usize> Tables<'_, N> {
         extra: &mut [[f64; N]],
         lag: &mut [[f64; N]],
     ) {
-        match self.bristle {
+        match self.bristles {
             None => self.moving(sliding, rows, extra, lag, |way, x, v, at| {
                 let slid = sliding.moved(way, x, v, &at.load, &at.friction);
                 slid.unwrap_or_else(|| {
@@ -104,15 +104,13 @@ impl<const N: usize> Tables<'_, N> {
                     self.stepped(&Way { at: 0.0, ..*way }, *x, *v, sliding.steps, at.load, rub)
                 })
             }),
-            Some(at_rest) => {
-                let mut bristles = [at_rest; N];
+            Some(mut bristles) => {
                 let half = 0.5 * sliding.share * self.frame.columns.period_s;
                 self.moving(sliding, rows, extra, lag, |way, x, v, at| {
-                    let rub = |l: usize| self.share[l] * bristles[l].after(half * v[l], at.level);
-                    let moved = sliding.moved_against(way, x, v, &lanes(|l| at.load[l] + rub(l)));
-                    for l in 0..N {
-                        bristles[l].moved(moved.position[l] - x[l], at.level);
-                    }
+                    let half_way = bristles.after(v.map(|v| half * v), at.level);
+                    let rub = lanes(|l| at.load[l] + self.share[l] * half_way[l]);
+                    let moved = sliding.moved_against(way, x, v, &rub);
+                    bristles.moved(lanes(|l| moved.position[l] - x[l]), at.level);
                     moved
                 });
             }

@@ -1,0 +1,126 @@
+//! Friction that builds up on the ways of several tables at once: a plain bristle is a few products in all lanes of a register, by the
+//! law of [`Friction::moved`]; what builds up by another law goes table by table.
+
+use super::{lanes, larger};
+use crate::diagnosis::many::decay;
+use crate::plant::friction::Friction;
+
+/// How friction has built up on the way of each table.
+#[derive(Clone, Copy)]
+pub(super) enum Bristles<const N: usize> {
+    /// Dahl's bristle of each: its torque and its stiffness.
+    Plain {
+        /// Torque.
+        force: [f64; N],
+        /// Stiffness.
+        stiffness: [f64; N],
+    },
+    /// By any other law.
+    Other([Friction; N]),
+}
+
+impl<const N: usize> Bristles<N> {
+    /// At rest.
+    pub(super) fn new(at_rest: [Friction; N]) -> Self {
+        if at_rest.iter().all(Friction::is_plain_bristle) {
+            Self::Plain { force: [0.0; N], stiffness: at_rest.map(|friction| friction.bristle.stiffness) }
+        } else {
+            Self::Other(at_rest)
+        }
+    }
+
+    /// Torque after each was moved so far at its level.
+    #[inline(always)]
+    pub(super) fn moved(&mut self, way: [f64; N], level: [f64; N]) -> [f64; N] {
+        match self {
+            Self::Plain { force, stiffness } => {
+                *force = built(force, stiffness, way, level);
+                *force
+            }
+            Self::Other(frictions) => lanes(|l| frictions[l].moved(way[l], level[l])),
+        }
+    }
+
+    /// The same with the bristles left where they are.
+    #[inline(always)]
+    pub(super) fn after(&self, way: [f64; N], level: [f64; N]) -> [f64; N] {
+        match self {
+            Self::Plain { force, stiffness } => built(force, stiffness, way, level),
+            Self::Other(frictions) => lanes(|l| frictions[l].after(way[l], level[l])),
+        }
+    }
+
+    /// All moved alike, of which so many differ; the rest go as the first.
+    #[inline(always)]
+    pub(super) fn moved_together(&mut self, way: f64, level: [f64; N], distinct: usize) {
+        match self {
+            Self::Plain { .. } => _ = self.moved([way; N], level),
+            Self::Other(frictions) => {
+                for l in 0..distinct {
+                    frictions[l].moved(way, level[l]);
+                }
+                for l in distinct..N {
+                    frictions[l] = frictions[0];
+                }
+            }
+        }
+    }
+
+    /// Makes that of one table what it is in another.
+    #[inline(always)]
+    pub(super) fn take(&mut self, l: usize, from: &Self) {
+        match (self, from) {
+            (Self::Plain { force, .. }, Self::Plain { force: other, .. }) => force[l] = other[l],
+            (Self::Other(frictions), Self::Other(others)) => frictions[l] = others[l],
+            _ => {}
+        }
+    }
+}
+
+/// Torque of plain bristles: of the way from −L to L a share is left that falls as e^−σ·|q|/L.
+#[inline(always)]
+fn built<const N: usize>(force: &[f64; N], stiffness: &[f64; N], way: [f64; N], level: [f64; N]) -> [f64; N] {
+    lanes(|l| {
+        let per_level = if level[l] > 0.0 { 1.0 / level[l] } else { 0.0 };
+        let side = 1.0f64.copysign(way[l]);
+        // A level that has fallen below the torque holds no more than itself.
+        let left = larger(0.5 - 0.5 * force[l] * side * per_level, 0.0);
+        level[l] * side * (1.0 - 2.0 * left * decay(stiffness[l] * way[l].abs() * per_level))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::friction::BristleLaw;
+    use crate::plant::noise::Noise;
+
+    #[test]
+    fn bristles_side_by_side_go_as_each_by_itself() {
+        let of_elements = BristleLaw { exponent: 0.4, of_elements: true, micro_damping_s: 0.0 };
+        let of_two = BristleLaw { exponent: 2.0, of_elements: false, micro_damping_s: 0.0 };
+        for law in [BristleLaw::default(), of_two, of_elements] {
+            let mut each: [Friction; 4] = lanes_of(|l| Friction::new(50.0 + 20.0 * l as f64, law));
+            let mut together = Bristles::new(each);
+            assert_eq!(matches!(together, Bristles::Plain { .. }), law == BristleLaw::default());
+            let mut noise = Noise::new(5);
+            for step in 0..2000 {
+                let mut random = || noise.uniform() - 0.5;
+                let way: [f64; 4] = lanes(|_| 0.1 * random());
+                // A level of nothing holds nothing.
+                let level: [f64; 4] = lanes(|_| if step % 97 == 0 { 0.0 } else { 1.0 + random() });
+                let ahead = together.after(way, level);
+                let moved = together.moved(way, level);
+                assert_eq!(ahead, moved);
+                for l in 0..4 {
+                    let own = each[l].moved(way[l], level[l]);
+                    assert!((own - moved[l]).abs() < 1e-8, "{law:?}, step {step}: {own} is not {}", moved[l]);
+                }
+            }
+        }
+    }
+
+    fn lanes_of<const N: usize>(friction: impl Fn(usize) -> Friction) -> [Friction; N] {
+        std::array::from_fn(friction)
+    }
+}
