@@ -41,10 +41,6 @@ pub fn settled(bench: &Bench, held_out: &HeldOut, found: Selection, watch: &Watc
     fits.sort_by(|a, b| a.squares().total_cmp(&b.squares()));
     let best = fits.remove(0);
     fits.retain(|fit| fit.squares() <= ALIKE * best.squares());
-    // Where a scale tells the table's motion, all predict alike, and the fit stays as it is.
-    if bench.frame.columns.table.is_some() {
-        return Ok(Selection { fit: best, alike: fits, ..found });
-    }
     // Where the best leaves little more than noise, so must what is taken in its place.
     let rattles = Excess::of(bench, &best, &best).largest() > LITTLE_LEFT;
     let mut taken = watch.each(&FROM_HARD_TO_SOFT, (0.91, 0.92), stage, |&hz| with_contact(&best, hz))?;

@@ -7,7 +7,7 @@ mod laws;
 use super::fit::{Bench, Fit, Part};
 use super::judge::{Excess, LITTLE_LEFT, MOST_OF_A_CURVE};
 use super::progress::{Stopped, Watch};
-use super::select::{LEAST_GAIN, NUMBER_PRICE, price};
+use super::select::{BELIEF, LEAST_GAIN, NUMBER_PRICE, price};
 use super::shrink::idle_left_out;
 use laws::{Foreign, LAWS, PLACES};
 
@@ -72,7 +72,9 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
         let stays = |part: &&Part| left.parts.iter().any(|l| l.law.cause == part.law.cause && l.shape == part.shape);
         let needed: Vec<Part> = found.parts.iter().filter(stays).cloned().collect();
         let own = bench.fit(needed).squares() - found.squares();
-        let least = if needless > 1 { 0.0 } else { FOR_AS_MANY };
+        // Several numbers of the belief may well be wrong at once, and need no law without a name for that.
+        let guesses = found.parts.iter().filter(|part| !stays(part) && !BELIEF.contains(&part.law.cause)).count();
+        let least = if needless > 1 && guesses > 0 { 0.0 } else { FOR_AS_MANY };
         // Any form also takes what one cause leaves by being not quite the law that the machine follows.
         let in_place = needless > 1 || needless == 1 && (!law.takes_any_form() || more > MOST_OF_A_CURVE * explained);
         if in_place && better > least && own > MOST * explained {

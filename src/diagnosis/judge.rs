@@ -137,8 +137,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     /// What held-out rows say of a set of causes by its errors there.
     fn weighed(&self, fit: &Fit, errors: Option<&Errors>, verdict: Verdict) -> Weighed {
         let gains = self.held_out.gains(self.believed.as_ref(), errors);
-        let judged = |errors: Option<&Errors>| errors.map(|errors| self.held_out.judged(errors));
-        let in_judged_rows = self.held_out.gains(judged(self.believed.as_ref()).as_ref(), judged(errors).as_ref());
+        let in_judged_rows = self.held_out.judged_gains(self.believed.as_ref(), errors);
         let effects: Vec<Effect> = fit.effects(self.bench.frame).collect();
         let misleads = verdict == Verdict::PartlyExplained && moves_worse(&in_judged_rows);
         let fails = misleads || refuted(&in_judged_rows, &effects);

@@ -33,6 +33,7 @@ mod many;
 mod means;
 mod narrow;
 pub mod progress;
+mod quiet;
 mod reopened;
 mod replayed;
 mod rows;

@@ -59,7 +59,7 @@ pub struct Selection {
 }
 
 /// The numbers of a belief that a search may leave open from the start: the balance is linear in them.
-const BELIEF: [Cause; 4] =
+pub const BELIEF: [Cause; 4] =
     [Cause::InertiaMismatch, Cause::CoulombFrictionMismatch, Cause::ViscousFrictionMismatch, Cause::ConstantTorque];
 
 /// Terms at the starts of the laws whose starts do not depend on the rest: they are made once.
@@ -191,8 +191,10 @@ fn grown_on(search: &Search, found: Selection) -> Result<Selection, Stopped> {
     if !fit.parts.iter().any(formulation::is_another) {
         return Ok(found);
     }
+    // What takes the place of friction that builds up makes a set no larger, and that friction may join it again: each must cost less.
     while fit.parts.len() < MOST {
-        let Some(next) = grow(search, std::slice::from_ref(&fit), (0.9, 0.9))?.into_iter().next() else { break };
+        let next = grow(search, std::slice::from_ref(&fit), (0.9, 0.9))?.into_iter().next();
+        let Some(next) = next.filter(|next| price(next) < price(&fit)) else { break };
         fit = next;
     }
     if fit.parts.len() == found.fit.parts.len() {

@@ -5,6 +5,7 @@
 //! groups explain of pure chance (adjusted R²); for frequency, that of the strongest line less what noise has there.
 
 use super::causes::periods;
+use super::filter::LowPass;
 use super::fit::{Bench, Fit};
 use super::frame::Frame;
 
@@ -28,6 +29,9 @@ pub struct View {
 const TIED: f64 = 0.05;
 /// Variance above the noise floor, in units of the floor's, from which on it is said where a residual lives.
 const LITTLE: f64 = 0.5;
+
+/// How much wider than that of the balance the low-pass is that takes the encoder's noise off the acceleration; odd.
+const SMOOTHER: usize = 5;
 
 /// What a residual may go with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,9 +93,13 @@ pub fn against_all(frame: &Frame, before: &[f64], after: &[f64]) -> Vec<View> {
     let grouped = |coordinate: Coordinate| {
         let places = places(frame, coordinate);
         let (a, b) = (Groups::of(&places, before), Groups::of(&places, after));
+        let [a_share, b_share] = [(&a, before), (&b, after)].map(|(groups, values)| match coordinate {
+            Coordinate::Acceleration => groups.share().min(share_along_smooth(frame, values)),
+            _ => groups.share(),
+        });
         let value = |at: f64| if coordinate == Coordinate::SinceReversal { at.exp() } else { at };
         let curve = a.means().zip(b.means()).map(|((at, a), (_, b))| (value(at), a, b)).collect();
-        View { coordinate, before: a.share(), after: b.share(), curve }
+        View { coordinate, before: a_share, after: b_share, curve }
     };
     COORDINATES
         .into_iter()
@@ -117,6 +125,13 @@ pub fn share_along(bench: &Bench, fit: &Fit, coordinate: Coordinate) -> f64 {
 #[must_use]
 pub fn share_of(frame: &Frame, values: &[f64], coordinate: Coordinate) -> f64 {
     Groups::of(&places(frame, coordinate), values).share()
+}
+
+/// Share that goes with the acceleration as far as the encoder's noise is not in that: the balance has the noise as acceleration, with
+/// which the residual goes of itself.
+fn share_along_smooth(frame: &Frame, values: &[f64]) -> f64 {
+    let smooth = LowPass { width: SMOOTHER * frame.low_pass.width }.run(&frame.a, &frame.columns.stretches);
+    Groups::of(&frame.kept.iter().map(|&row| smooth[row]).collect::<Vec<f64>>(), values).share()
 }
 
 /// Where the judged rows are along a coordinate: distance since reversal by its logarithm, frequency nowhere.

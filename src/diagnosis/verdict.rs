@@ -14,6 +14,7 @@ use super::judge::{Excess, Judge, Judged, refutation, refuted, rms, shows};
 use super::known::Known;
 use super::narrow::{self, Band};
 use super::progress::{Progress, Stopped, Watch};
+use super::quiet;
 use super::reopened;
 use super::replayed;
 use super::select::{Search, Selection};
@@ -143,18 +144,39 @@ pub fn diagnose(
     }
     watch.at(0.05, "reading the motion")?;
     let recorded = Recorded { axis, belief: axis, whole, holdout, watch: &watch };
-    let found = answer(&recorded, &frame, notes.clone())?;
+    let mut found = answer(&recorded, &frame, notes.clone())?;
     // Between a motor that winds up its drive and one that drags bristles these rows do not tell.
     const YIELDING: [Cause; 3] = [Cause::PreslidingFriction, Cause::DriveCompliance, Cause::Backlash];
     let told = found.findings.iter().any(|finding| YIELDING.contains(&finding.effect.cause()));
     if !told && belief::may_be_found(axis, Cause::PreslidingFriction) {
         if let Some(way) = creep::way(&frame) {
             let frame = without_swings(Frame::yielding_over(&base, &columns, None, way));
-            let again = answer(&recorded, &frame, notes)?;
+            let again = answer(&recorded, &frame, notes.clone())?;
             if creep::is_over(way, again.findings.iter().map(|finding| finding.effect)) {
                 return Ok(again);
             }
         }
+    }
+    let (mut frame, mut heard) = (frame, None);
+    for _ in 0..quiet::MOST {
+        if !matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained | Verdict::UnknownCause) {
+            break;
+        }
+        let wide = without_swings(Frame::new(&base, &columns, Some(quiet::wider(&frame))));
+        // What was heard once is asked again whether that is quieter or not.
+        if !what_is_missing(&wide).is_empty() || heard.is_none() && !quiet::is_quieter(axis, &wide, &frame) {
+            break;
+        }
+        let again = answer(&recorded, &wide, notes.clone())?;
+        if quiet::finds_more(&again, &found) {
+            found = again;
+        } else if found.verdict == Verdict::NoDiscrepancy {
+            match heard.take().filter(|before| quiet::agree(before, &again)) {
+                Some(before) => found = before,
+                None => heard = Some(again),
+            }
+        }
+        frame = wide;
     }
     Ok(found)
 }

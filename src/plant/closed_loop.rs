@@ -70,7 +70,7 @@ fn replayed(
     mut torque: TorquePrediction,
     servo: &ByServo,
 ) -> Result<Prediction, String> {
-    let rest = rows_at_rest(observed);
+    let rest = later(rows_at_rest(observed), torque.physics.delay_s / observed.period_s, observed.time_s.len());
     let begun = Begun::of(axis, observed, &mut torque, &rest, servo)?;
     let replay = |speed, added| Replay::felt(axis, observed, &torque, &rest, speed, added);
     let mut best = replay(CommandSpeed::Central, servo.added[0].as_ref())?;
@@ -326,11 +326,14 @@ fn replay(
         let exact = (time[row] - begin) / servo.period_s;
         if (exact - exact.round()).abs() <= ROUNDED { exact.round() } else { exact }
     };
+    // The torque column shows what was there a delay before.
+    let late = prediction.physics.delay_s / servo.period_s;
+    let shown = |row: usize| (place(row) - late).clamp(0.0, (cycles - 1) as f64);
     let with_table = observed.table_position.is_some();
     let mut rows = AtRows {
         motor: Reader::new(cycles, time.len(), (0..time.len()).map(place)),
         table: with_table.then(|| Reader::new(cycles, time.len(), (0..time.len()).map(place))),
-        torque: Reader::new(cycles, rest.iter().map(Range::len).sum(), rest.iter().cloned().flatten().map(place)),
+        torque: Reader::new(cycles, rest.iter().map(Range::len).sum(), rest.iter().cloned().flatten().map(shown)),
     };
     let physics = prediction.physics.clone();
     simulate_cycles(axis, physics, command, added, &setup, &mut Noise::new(0), &mut rows)?;
@@ -383,7 +386,7 @@ impl<P: Iterator<Item = f64>> Reader<P> {
     }
 }
 
-/// Rows at rest, whose torque is that of the replay.
+/// Rows at rest, whose torque is that of the replay; a torque column that is late shows it as much later.
 ///
 /// What dry friction holds at rest is not in the motion: it is what the servo has come to by then, which the replay
 /// knows. At rest means less travel within a period of the motion's cut-off than reversing friction takes.
@@ -397,14 +400,20 @@ fn rows_at_rest(observed: &Observed) -> Vec<Range<usize>> {
     for (i, v) in motion.velocities().enumerate() {
         length = if v.abs() < slow { length + 1 } else { 0 };
         if length > 2 * around {
-            let row = i - around;
             match rest.last_mut() {
-                Some(last) if last.end == row => last.end = row + 1,
-                _ => rest.push(row..row + 1),
+                Some(last) if last.end == i => last.end = i + 1,
+                _ => rest.push(i - 2 * around..i + 1),
             }
         }
     }
     rest
+}
+
+/// Rows so many rows later, among all of a recording.
+fn later(rows: Vec<Range<usize>>, by: f64, all: usize) -> Vec<Range<usize>> {
+    let by = by.round() as isize;
+    let moved = |row: usize| row.saturating_add_signed(by).min(all);
+    rows.into_iter().map(|rows| moved(rows.start)..moved(rows.end)).filter(|rows| !rows.is_empty()).collect()
 }
 
 /// Share of a cycle that is none: times are written rounded.

@@ -43,7 +43,7 @@ pub static LAW: Law = Law {
 
 /// Starts with a width.
 fn of_width(width: f64) -> impl Iterator<Item = Vec<f64>> {
-    let shares = [0.33, 0.52].into_iter().flat_map(|table| [0.5, 0.67, 0.84].map(|friction| (table, friction)));
+    let shares = [0.33, 0.52].into_iter().flat_map(|table| [0.3, 0.5, 0.67, 0.84].map(|friction| (table, friction)));
     shares.map(move |(table, friction)| vec![width, table, friction, 700.0])
 }
 

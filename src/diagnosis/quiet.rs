@@ -1,0 +1,73 @@
+//! A quieter look at the same rows.
+//!
+//! A servo answers the noise of its encoder, and what it makes of that is true torque, which the axis follows by less than the encoder
+//! shows: torque and acceleration differ by much that is fast and cancels out within some rows. A low-pass of twice the width takes half
+//! of the rows and leaves a third of such noise or less, while of white noise it leaves 0.7. What is slow, as a wrong mass, a ripple or
+//! a drift, then shows that was lost in it; what is fast no longer does, and is looked for first.
+
+use super::fit::Bench;
+use super::frame::Frame;
+use super::known::Known;
+use super::select::LEAST_STRENGTH;
+use super::verdict::{Diagnosis, Verdict};
+use crate::machine::{Axis, Cause};
+
+/// Share of the noise that a low-pass of twice the width leaves at most for it to be worth it.
+const QUIETER: f64 = 0.5;
+/// How often the width is doubled at most.
+pub const MOST: usize = 3;
+
+/// The width of a low-pass that is twice as wide.
+#[must_use]
+pub fn wider(frame: &Frame) -> usize {
+    2 * frame.low_pass.width + 1
+}
+
+/// Whether noise is quieter in a wider frame by more than white noise would be.
+#[must_use]
+pub fn is_quieter(axis: &Axis, wide: &Frame, frame: &Frame) -> bool {
+    let noise = |frame: &Frame| Bench::new(frame, &Known::of(axis, frame)).floors[0];
+    noise(wide) < QUIETER * noise(frame)
+}
+
+/// What acts about reversals only, or in instants: the low-pass smears it as it does the balance itself.
+const FAST: [Cause; 5] =
+    [Cause::StribeckFriction, Cause::PreslidingFriction, Cause::Backlash, Cause::DriveCompliance, Cause::DeadTime];
+
+/// Whether a quieter look has found what the look before has not: causes that explain all where none fitted, or more of them than it
+/// had. What is fast it does not add: there it stands in for what the low-pass smears.
+#[must_use]
+pub fn finds_more(again: &Diagnosis, before: &Diagnosis) -> bool {
+    let (found, known) = (causes(again), causes(before));
+    let mut more = found.iter().filter(|cause| !known.contains(cause)).peekable();
+    let slow = more.peek().is_some() && more.all(|cause| !FAST.contains(cause));
+    again.verdict == Verdict::Explained
+        && is_sure(again)
+        && (before.verdict == Verdict::UnknownCause || slow && known.iter().all(|cause| found.contains(cause)))
+}
+
+/// Whether a look that explains all and a quieter one that may leave a little find the same causes: together they are believed what is
+/// fast as well.
+#[must_use]
+pub fn agree(one: &Diagnosis, other: &Diagnosis) -> bool {
+    let sorted = |diagnosis: &Diagnosis| {
+        let mut list = causes(diagnosis);
+        list.sort();
+        list
+    };
+    let named = matches!(other.verdict, Verdict::Explained | Verdict::PartlyExplained);
+    one.verdict == Verdict::Explained && named && is_sure(one) && sorted(one) == sorted(other)
+}
+
+/// Whether a delay that is named is known to be one, with all that its interval holds: what a servo makes of the grid of its encoder, and
+/// the sampling that nobody knows.
+fn is_sure(diagnosis: &Diagnosis) -> bool {
+    let delays = diagnosis.findings.iter().filter(|finding| finding.effect.cause() == Cause::DeadTime);
+    delays
+        .flat_map(|delay| delay.effect.values().into_iter().zip(&delay.deviations))
+        .all(|(value, deviation)| value.abs() > LEAST_STRENGTH * deviation)
+}
+
+fn causes(diagnosis: &Diagnosis) -> Vec<Cause> {
+    diagnosis.findings.iter().map(|finding| finding.effect.cause()).collect()
+}
