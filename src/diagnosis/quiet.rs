@@ -8,9 +8,9 @@
 use super::fit::Bench;
 use super::frame::Frame;
 use super::known::Known;
-use super::select::LEAST_STRENGTH;
+use super::select::{LEAST_GAIN, LEAST_STRENGTH};
 use super::verdict::{Diagnosis, Verdict};
-use crate::machine::{Axis, Cause};
+use crate::machine::Cause;
 
 /// Share of the noise that a low-pass of twice the width leaves at most for it to be worth it.
 const QUIETER: f64 = 0.5;
@@ -23,11 +23,15 @@ pub fn wider(frame: &Frame) -> usize {
     2 * frame.low_pass.width + 1
 }
 
-/// Whether noise is quieter in a wider frame by more than white noise would be.
+/// Whether a wider frame promises more than an answer so far: its noise is quieter by more than white noise would be, and it holds more
+/// than that beside what was found.
 #[must_use]
-pub fn is_quieter(axis: &Axis, wide: &Frame, frame: &Frame) -> bool {
-    let noise = |frame: &Frame| Bench::new(frame, &Known::of(axis, frame)).floors[0];
-    noise(wide) < QUIETER * noise(frame)
+pub fn promises(wide: &Frame, frame: &Frame, found: &Diagnosis) -> bool {
+    let beside = |frame| Bench::new(frame, &Known::of(&found.extended, frame));
+    let quiet = beside(wide);
+    let left = quiet.channels(&quiet.measured)[0];
+    quiet.floors[0] < QUIETER * beside(frame).floors[0]
+        && (found.verdict == Verdict::UnknownCause || left > 1.0 + LEAST_GAIN)
 }
 
 /// What acts about reversals only, or in instants: the low-pass smears it as it does the balance itself.

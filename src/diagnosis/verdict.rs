@@ -164,7 +164,7 @@ pub fn diagnose(
         }
         let wide = without_swings(Frame::new(&base, &columns, Some(quiet::wider(&frame))));
         // What was heard once is asked again whether that is quieter or not.
-        if !what_is_missing(&wide).is_empty() || heard.is_none() && !quiet::is_quieter(axis, &wide, &frame) {
+        if !what_is_missing(&wide).is_empty() || heard.is_none() && !quiet::promises(&wide, &frame, &found) {
             break;
         }
         let again = answer(&recorded, &wide, notes.clone())?;
