@@ -10,7 +10,7 @@ use super::frame::Frame;
 use super::known::Known;
 use super::select::{LEAST_GAIN, LEAST_STRENGTH};
 use super::verdict::{Diagnosis, Verdict};
-use crate::machine::Cause;
+use crate::machine::{Axis, Cause};
 
 /// Share of the noise that a low-pass of twice the width leaves at most for it to be worth it.
 const QUIETER: f64 = 0.5;
@@ -51,16 +51,17 @@ pub fn finds_more(again: &Diagnosis, before: &Diagnosis) -> bool {
 }
 
 /// Whether a look that explains all and a quieter one that may leave a little find the same causes: together they are believed what is
-/// fast as well.
+/// fast as well, unless something of the kind is believed: what a low-pass smears of that looks like other numbers of it.
 #[must_use]
-pub fn agree(one: &Diagnosis, other: &Diagnosis) -> bool {
+pub fn agree(axis: &Axis, one: &Diagnosis, other: &Diagnosis) -> bool {
+    let believed = axis.effects.iter().any(|effect| FAST.contains(&effect.cause()));
     let sorted = |diagnosis: &Diagnosis| {
         let mut list = causes(diagnosis);
         list.sort();
         list
     };
     let named = matches!(other.verdict, Verdict::Explained | Verdict::PartlyExplained);
-    one.verdict == Verdict::Explained && named && is_sure(one) && sorted(one) == sorted(other)
+    !believed && one.verdict == Verdict::Explained && named && is_sure(one) && sorted(one) == sorted(other)
 }
 
 /// Whether a delay that is named is known to be one, with all that its interval holds: what a servo makes of the grid of its encoder, and

@@ -171,7 +171,7 @@ pub fn diagnose(
         if quiet::finds_more(&again, &found) {
             found = again;
         } else if found.verdict == Verdict::NoDiscrepancy {
-            match heard.take().filter(|before| quiet::agree(before, &again)) {
+            match heard.take().filter(|before| quiet::agree(axis, before, &again)) {
                 Some(before) => found = before,
                 None => heard = Some(again),
             }
