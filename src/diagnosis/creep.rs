@@ -4,9 +4,14 @@
 //! friction builds up over a way of a few steps of the encoder it says most at just those rows: the torque goes with the little that the
 //! axis yields. Whether it does is seen from these rows alone.
 
-use super::causes::presliding_friction::bristle_over;
+use super::causes::law;
+use super::causes::presliding_friction::{BRISTLE, ELEMENTS, bristle_over};
+use super::fit::{Bench, figure};
 use super::frame::Frame;
-use crate::machine::Effect;
+use super::known::Known;
+use super::select::LEAST_GAIN;
+use super::verdict::Diagnosis;
+use crate::machine::{Cause, Effect};
 
 /// Ways that are tried, in steps that the encoder tells for sure, and their ratio.
 const WAYS: [f64; 2] = [1.0, 300.0];
@@ -22,6 +27,8 @@ const FORGOTTEN: f64 = 5.0;
 const LEAST_SHARE: f64 = 0.8;
 /// Ratio of ways that are about the same.
 const ABOUT: f64 = 3.0;
+/// Ways beside it at which it is tried.
+const ABOUT_IT: [f64; 3] = [0.5, 1.0, 2.0];
 /// The level that builds up over that of Coulomb friction.
 const LEVELS: [f64; 2] = [0.6, 1.6];
 
@@ -39,6 +46,18 @@ pub fn way(frame: &Frame) -> Option<f64> {
     let (at, share) = shares.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
     // At the longest way nothing says that a longer one would not do as well.
     (share > LEAST_SHARE && at + 1 < ways.len()).then(|| ways[at])
+}
+
+/// Whether friction that yields over about a way takes some off what an answer leaves, on a frame that judges the rows where it yields.
+#[must_use]
+pub fn promises(yielding: &Frame, way: f64, found: &Diagnosis) -> bool {
+    let bench = Bench::new(yielding, &Known::of(&found.extended, yielding));
+    let set = bench.fit(Vec::new());
+    let over = |ratio: f64| [BRISTLE, ELEMENTS].map(|[exponent, kind]| vec![1e3 * way * ratio, exponent, kind]);
+    let starts = ABOUT_IT.into_iter().flat_map(over).collect();
+    let joined =
+        bench.parts(law(Cause::PreslidingFriction), starts).into_iter().map(|part| figure(&bench.joined(&set, &part)));
+    joined.fold(f64::INFINITY, f64::min) < set.figure() - LEAST_GAIN
 }
 
 /// Whether among effects friction builds up over about that way: elements over half of it go as a bristle.

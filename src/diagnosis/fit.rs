@@ -218,6 +218,12 @@ impl<'f, 'a> Bench<'f, 'a> {
     /// Sum of squares per channel if this part joined a fit whose other parts keep their non-linear parameters.
     #[must_use]
     pub fn joined(&self, fit: &Fit, part: &Part) -> Vec<f64> {
+        channel_squares(&self.left_joined(fit, part).1, self.rows)
+    }
+
+    /// What would be left, and the share of its size at which the part's own trace would leave that.
+    #[must_use]
+    pub fn left_joined(&self, fit: &Fit, part: &Part) -> (f64, Vec<f64>) {
         let mut residual = fit.residual.clone();
         let mut own: Vec<Vec<f64>> = Vec::new();
         let clear = |column: &[f64], own: &[Vec<f64>]| {
@@ -231,11 +237,12 @@ impl<'f, 'a> Bench<'f, 'a> {
             }
             c
         };
+        let mut size = 1.0;
         if let Some(fixed) = &part.fixed {
             let fixed = clear(fixed, &[]);
             // A start is not yet as large as it will be: without coefficients its trace counts by its form.
             let along = dot(&fixed, &residual) / dot(&fixed, &fixed).max(1e-300);
-            let size = if part.columns.is_empty() { along.clamp(0.0, MOST_SIZE) } else { 1.0 };
+            size = if part.columns.is_empty() { along.clamp(0.0, MOST_SIZE) } else { 1.0 };
             add(&mut residual, -size, &fixed);
         }
         for column in part.columns.iter() {
@@ -249,7 +256,7 @@ impl<'f, 'a> Bench<'f, 'a> {
                 own.push(c);
             }
         }
-        channel_squares(&residual, self.rows)
+        (size, residual)
     }
 
     /// The coefficients that the rows outside some blocks give, at the same non-linear parameters.

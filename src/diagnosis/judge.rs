@@ -262,11 +262,11 @@ pub fn shows(gains: &[Gain]) -> bool {
     gains.iter().any(|gain| (gain.before / gain.after).ln().abs() > LEAST_RATIO.ln())
 }
 
-/// Whether the machine is worse with a cause, or not known to be better in any channel by what can be seen: what such a cause
-/// gains in the balance is none of the machine's.
+/// Whether the machine is worse with a cause, or moves worse, or is not known to be better in any channel by what can be seen: what such
+/// a cause gains in the balance is none of the machine's.
 fn is_idle(gains: &[Gain]) -> bool {
     let better = |gain: &Gain| gain.ci95[0] > 1.0 && gain.before > LEAST_RATIO * gain.after;
-    !gains.is_empty() && !gains.iter().any(better) || refuted(gains, &[])
+    !gains.is_empty() && !gains.iter().any(better) || moves_worse(gains) || refuted(gains, &[])
 }
 
 /// Says what imitates a law that has no name.

@@ -20,6 +20,7 @@ use super::valleys;
 use crate::machine::Cause;
 use std::collections::{HashMap, HashSet};
 
+mod noise;
 mod starts;
 
 use starts::{Child, at_best_starts, at_seldom_starts};

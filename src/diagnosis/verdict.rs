@@ -151,9 +151,11 @@ pub fn diagnose(
     if !told && belief::may_be_found(axis, Cause::PreslidingFriction) {
         if let Some(way) = creep::way(&frame) {
             let frame = without_swings(Frame::yielding_over(&base, &columns, None, way));
-            let again = answer(&recorded, &frame, notes.clone())?;
-            if creep::is_over(way, again.findings.iter().map(|finding| finding.effect)) {
-                return Ok(again);
+            if creep::promises(&frame, way, &found) {
+                let again = answer(&recorded, &frame, notes.clone())?;
+                if creep::is_over(way, again.findings.iter().map(|finding| finding.effect)) {
+                    return Ok(again);
+                }
             }
         }
     }

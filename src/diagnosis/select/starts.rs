@@ -99,7 +99,8 @@ pub fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law, much
         let in_a_row = law.is_simulated() && !law.manner.approached;
         let other = if in_a_row { other_valley(&figures, set.figure()) } else { None };
         let elsewhere = other.map(|i| parts[i].clone());
-        (figure < least).then(|| Child::new(set, part, figure, elsewhere))
+        let by_noise = || law.is_simulated() && noise::drives(bench, set, part);
+        (figure < least && !by_noise()).then(|| Child::new(set, part, figure, elsewhere))
     };
     // There is one ripple of few periods at most.
     let has_few = set.parts.iter().any(|part| part.law.cause == law.cause && few_periods(part));
