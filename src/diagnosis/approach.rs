@@ -6,6 +6,7 @@
 use super::causes::Law;
 use super::fit::{Bench, Fit, Part, figure};
 use super::many::dot;
+use rayon::prelude::*;
 
 /// Times over which rows are summed, s, and how far apart the points of a slope are, in steps of each scale.
 const STAGES: [(f64, f64); 3] = [(0.05, 12.0), (0.02, 8.0), (0.006, 4.0)];
@@ -43,7 +44,8 @@ impl<'f, 'a> Approach<'f, 'a> {
             let left = left(part);
             dot(&left, &left)
         };
-        let (_, nearest) = starts.iter().map(|part| (squares(part), part)).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let rated = starts.par_iter().map(|part| (squares(part), part));
+        let (_, nearest) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
         // Starts lie so close that one of them takes off much of what a clearance makes.
         if figure(&first.channels(&left(nearest))) > there.figure() - LEAST {
             return None;

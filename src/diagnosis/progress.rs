@@ -53,23 +53,17 @@ impl<'p> Watch<'p> {
     ///
     /// # Errors
     /// [`Stopped`] when the caller said so.
-    pub fn both<A: Send, B>(
+    pub fn both<A: Send, B: Send>(
         &self,
         one: impl FnOnce() -> Result<A, Stopped> + Send,
-        other: impl FnOnce() -> Result<B, Stopped>,
+        other: impl FnOnce() -> Result<B, Stopped> + Send,
     ) -> Result<(A, B), Stopped> {
-        std::thread::scope(|scope| {
-            let one = scope.spawn(one);
-            let other = other();
-            match one.join() {
-                Ok(one) => Ok((one?, other?)),
-                Err(panic) => std::panic::resume_unwind(panic),
-            }
-        })
+        let (one, other) = rayon::join(one, other);
+        Ok((one?, other?))
     }
 
-    /// Runs a function over items on the cores at hand and answers in the order of the items; reports between `from` and
-    /// `to` as items are done.
+    /// Runs a function over items on the cores at hand, begun in their order, and answers in it; reports between `from` and `to` as
+    /// items are done. What has nothing to do helps with what an item shares out in turn.
     ///
     /// # Errors
     /// [`Stopped`] when the caller said so; items that were begun are finished first.
@@ -97,10 +91,9 @@ impl<'p> Watch<'p> {
                 }
             }
         };
-        let threads = std::thread::available_parallelism().map_or(1, |n| n.get().min(8));
-        std::thread::scope(|scope| {
-            for _ in 1..threads.min(items.len()) {
-                scope.spawn(run);
+        rayon::scope(|scope| {
+            for _ in 1..rayon::current_num_threads().min(items.len()) {
+                scope.spawn(|_| run());
             }
             run();
         });
@@ -110,6 +103,18 @@ impl<'p> Watch<'p> {
         let mut list = done.into_inner().map_err(|_| Stopped)?;
         list.sort_by_key(|entry| entry.0);
         Ok(list.into_iter().map(|entry| entry.1).collect())
+    }
+}
+
+/// Most cores that one diagnosis takes.
+const MOST_CORES: usize = 8;
+
+/// Does work on threads of its own, one a core, which end with it; on those of the process where none can be had.
+pub fn on_all_cores<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get().min(MOST_CORES));
+    match rayon::ThreadPoolBuilder::new().num_threads(cores).build() {
+        Ok(pool) => pool.install(work),
+        Err(_) => work(),
     }
 }
 

@@ -180,7 +180,7 @@ fn at_the_bottom(search: &Search, fit: &Fit) -> Result<Fit, Stopped> {
     if fit.table().is_none() {
         return Ok(fit.clone());
     }
-    let refined = search.bench.refine_across(fit.clone(), 8, search.watch)?;
+    let refined = search.bench.refine(fit.clone(), 0, 8);
     let refined = valleys::settled(search.bench, search.laws, refined, search.watch)?;
     Ok(if is_physical(search.bench, &refined) { refined } else { fit.clone() })
 }

@@ -41,7 +41,7 @@ pub fn idle_left_out(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, 
 /// # Errors
 /// [`Stopped`] when the watch's caller said so.
 pub fn shrink(bench: &Bench, mut fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
-    fit = bench.refine_across(fit, 8, watch)?;
+    fit = bench.refine(fit, 0, 8);
     let all = 0..fit.parts.len();
     fit = form::settled(bench, fit, all, 8);
     while !fit.parts.is_empty() {

@@ -13,7 +13,7 @@ use super::gain::{self, Gain, Holdout};
 use super::judge::{Excess, Judge, Judged, refutation, refuted, rms, shows};
 use super::known::Known;
 use super::narrow::{self, Band};
-use super::progress::{Progress, Stopped, Watch};
+use super::progress::{Progress, Stopped, Watch, on_all_cores};
 use super::quiet;
 use super::reopened;
 use super::replayed;
@@ -121,7 +121,11 @@ pub fn diagnose(
     holdout: Option<&Excerpt>,
     progress: Progress,
 ) -> Result<Diagnosis, Stopped> {
-    let watch = Watch::new(progress);
+    on_all_cores(|| answer_to(axis, recording, holdout, &Watch::new(progress)))
+}
+
+/// The answer of [`diagnose`].
+fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch: &Watch) -> Result<Diagnosis, Stopped> {
     watch.at(0.0, "reading the motion")?;
     let (whole, notes) = match &recording.columns {
         Ok(columns) => (columns, recording.notes.clone()),
@@ -143,7 +147,7 @@ pub fn diagnose(
         return Ok(Diagnosis { notes, ..insufficient(axis, missing) });
     }
     watch.at(0.05, "reading the motion")?;
-    let recorded = Recorded { axis, belief: axis, whole, holdout, watch: &watch };
+    let recorded = Recorded { axis, belief: axis, whole, holdout, watch };
     let mut found = answer(&recorded, &frame, notes.clone())?;
     // Between a motor that winds up its drive and one that drags bristles these rows do not tell.
     const YIELDING: [Cause; 3] = [Cause::PreslidingFriction, Cause::DriveCompliance, Cause::Backlash];

@@ -27,6 +27,7 @@ pub(super) mod thermal_drift;
 
 use super::frame::Frame;
 use crate::machine::{Axis, Cause, Effect};
+use rayon::prelude::*;
 pub use table_side::Resistance;
 
 /// A regressor at the judged rows: what one unit of a coefficient adds.
@@ -228,9 +229,9 @@ pub fn law(cause: Cause) -> &'static Law {
     LAWS.iter().find(|law| law.cause == cause).copied().unwrap_or(&inertia_mismatch::LAW)
 }
 
-/// The traces one by one, where nothing is gained by making them together.
-fn each(shapes: &[Vec<f64>], term: impl Fn(&[f64]) -> Term) -> Vec<Term> {
-    shapes.iter().map(|shape| term(shape)).collect()
+/// The traces one by one, where nothing is gained by making them together; several at a time where cores have nothing to do.
+fn each(shapes: &[Vec<f64>], term: impl Fn(&[f64]) -> Term + Sync) -> Vec<Term> {
+    shapes.par_iter().map(|shape| term(shape)).collect()
 }
 
 /// The start of a law without non-linear parameters.

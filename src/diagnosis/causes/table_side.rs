@@ -20,6 +20,7 @@ use crate::diagnosis::many::widest;
 use crate::diagnosis::sampling::NUMEROV;
 use crate::machine::TwoMasses;
 use bristles::Bristles;
+use rayon::prelude::*;
 use resistance::{Alike, Each, Resisted};
 use spring::MOST_STEPS;
 use std::cell::RefCell;
@@ -41,7 +42,7 @@ pub fn terms_under_each(frame: &Frame, resistances: &[&Resistance], effect: Opti
             Tables::<FEW, _>::new(frame, Each(own), &[masses]).terms(several.len())
         }
     };
-    resistances.chunks(FEW).flat_map(together).collect()
+    resistances.par_chunks(FEW).flat_map_iter(together).collect()
 }
 
 /// Motor and table of an axis with an effect.
@@ -82,7 +83,9 @@ fn terms_of(frame: &Frame, resistance: &Resistance, splits: &[Option<TwoMasses>]
         [one] => Tables::<1, _>::new(frame, Alike(resistance), std::slice::from_ref(one)).terms(1),
         several => Tables::<LANES, _>::new(frame, Alike(resistance), several).terms(several.len()),
     };
-    let mut found = sound.chunks(LANES).flat_map(together).collect::<Vec<_>>().into_iter();
+    // As many in each go, which may go at a time.
+    let in_a_go = sound.len().div_ceil(sound.len().div_ceil(LANES).max(1)).max(1);
+    let mut found = sound.par_chunks(in_a_go).flat_map_iter(together).collect::<Vec<_>>().into_iter();
     splits.iter().map(|split| split.and_then(|_| found.next()).unwrap_or_default()).collect()
 }
 

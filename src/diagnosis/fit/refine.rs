@@ -6,7 +6,6 @@
 
 use super::{Bench, Fit, Part, Slope};
 use crate::diagnosis::causes::Resistance;
-use crate::diagnosis::progress::{Stopped, Watch};
 use crate::machine::{Cause, Effect};
 use std::sync::Arc;
 
@@ -19,35 +18,19 @@ impl Bench<'_, '_> {
     /// Refines the non-linear parameters of the parts from index `first` on, until a step brings nothing.
     #[must_use]
     pub fn refine(&self, fit: Fit, first: usize, most: usize) -> Fit {
-        self.refine_while(fit, first, most, 1e-5, |_| ())
-    }
-
-    /// The same of a set with nothing else to do beside it: on all cores at hand.
-    ///
-    /// # Errors
-    /// [`Stopped`] when the watch's caller said so.
-    pub fn refine_across(&self, fit: Fit, most: usize, watch: &Watch) -> Result<Fit, Stopped> {
-        let look_about = |fit: &Fit| {
-            let look = |part: &&Part| _ = self.both_sides(part);
-            let open: Vec<&Part> = fit.parts.iter().filter(|part| self.tells(part)).collect();
-            // Who says stop is heard after the fit.
-            _ = watch.each(&open, (0.8, 0.8), "fitting causes", look);
-        };
-        let fit = self.refine_while(fit, 0, most, 1e-5, look_about);
-        watch.at(0.8, "fitting causes").map(|()| fit)
+        self.refine_while(fit, first, most, 1e-5)
     }
 
     /// The same until a step takes less than a thousandth off the squares: enough to compare sets of causes.
     #[must_use]
     pub fn refine_roughly(&self, fit: Fit, first: usize, most: usize) -> Fit {
-        self.refine_while(fit, first, most, 1e-3, |_| ())
+        self.refine_while(fit, first, most, 1e-3)
     }
 
-    fn refine_while(&self, fit: Fit, first: usize, most: usize, least: f64, look_about: impl Fn(&Fit)) -> Fit {
+    fn refine_while(&self, fit: Fit, first: usize, most: usize, least: f64) -> Fit {
         let mut fit = self.at_one(fit);
         let mut steps = 0;
         while steps < most {
-            look_about(&fit);
             let slopes = self.open_slopes(&fit, first);
             if slopes.is_empty() {
                 break;

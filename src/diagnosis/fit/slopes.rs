@@ -2,6 +2,7 @@
 
 use super::{Bench, Fit, Part, add, projected};
 use crate::diagnosis::causes::Scale;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// The derivative of the model by one non-linear parameter.
@@ -43,8 +44,10 @@ impl Bench<'_, '_> {
     }
 
     fn slopes_of(&self, fit: &Fit, first: usize, open: impl Fn(&Part) -> bool) -> Vec<Slope> {
-        let parts = fit.parts.iter().enumerate().skip(first).filter(|(_, part)| open(part));
-        let sides = parts.flat_map(|(i, part)| self.both_sides(part).iter().map(move |side| (i, side)));
+        let parts: Vec<(usize, &Part)> =
+            fit.parts.iter().enumerate().skip(first).filter(|(_, part)| open(part)).collect();
+        self.look_about(&parts);
+        let sides = parts.into_iter().flat_map(|(i, part)| self.both_sides(part).iter().map(move |side| (i, side)));
         let found = sides.filter_map(|(i, side)| Some((side, self.slope(i, &fit.coefficients[i], side)?)));
         let (sides, mut slopes): (Vec<&Side>, Vec<Slope>) = found.unzip();
         if let Some(table) = fit.table().map(|at| &fit.parts[at]) {
@@ -110,6 +113,18 @@ impl Bench<'_, '_> {
             (normal[(i, i)], right[i], ends[i]) = (1.0, end, true);
         }
         steps
+    }
+
+    /// Works out what [`Bench::both_sides`] will be asked for, on all cores at hand: outside of it, lest a thread that waits there take up
+    /// work that waits for it.
+    fn look_about(&self, parts: &[(usize, &Part)]) {
+        let unseen: Vec<&Part> =
+            parts.iter().map(|(_, part)| *part).filter(|part| part.sides.get().is_none()).collect();
+        let sides: Vec<Vec<Side>> = unseen.par_iter().map(|part| self.sides(part, 1.0)).collect();
+        for (part, sides) in unseen.into_iter().zip(sides) {
+            // Where another thread was sooner its answer is the same.
+            _ = part.sides.set(sides);
+        }
     }
 
     /// A part to either side of where it stands; worked out once, since copies of a part stand in many sets.

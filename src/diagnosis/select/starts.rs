@@ -1,6 +1,7 @@
 //! Where a cause that may join a set is begun with.
 
 use super::*;
+use rayon::prelude::*;
 
 /// Of the starts of a law that turns a table round in another way, which is simulated anew for each, one in so many is tried.
 const EVERY: usize = 3;
@@ -77,7 +78,7 @@ pub fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law, much
     } else {
         shelved()
     };
-    let figures: Vec<f64> = parts.iter().map(|part| figure(&bench.joined(set, part)) + numbers(part)).collect();
+    let figures: Vec<f64> = parts.par_iter().map(|part| figure(&bench.joined(set, part)) + numbers(part)).collect();
     // What resists a simulated table is another with a friction more, and only then shows what that friction is worth.
     let beside_table = set.table().is_some() || law.is_simulated() && !set.parts.is_empty();
     let at_one = |part: &Part| {
