@@ -4,6 +4,7 @@
 //! friction builds up over a way of a few steps of the encoder it says most at just those rows: the torque goes with the little that the
 //! axis yields. Whether it does is seen from these rows alone.
 
+use super::belief;
 use super::causes::law;
 use super::causes::presliding_friction::{BRISTLE, ELEMENTS, bristle_over};
 use super::fit::{Bench, figure};
@@ -51,7 +52,9 @@ pub fn way(frame: &Frame) -> Option<f64> {
 /// Whether friction that yields over about a way takes some off what an answer leaves, on a frame that judges the rows where it yields.
 #[must_use]
 pub fn promises(yielding: &Frame, way: f64, found: &Diagnosis) -> bool {
-    let bench = Bench::new(yielding, &Known::of(&found.extended, yielding));
+    let base = belief::base_alone(&found.extended);
+    let yielding = yielding.believing(&base);
+    let bench = Bench::new(&yielding, &Known::of(&found.extended, &yielding));
     let set = bench.fit(Vec::new());
     let over = |ratio: f64| [BRISTLE, ELEMENTS].map(|[exponent, kind]| vec![1e3 * way * ratio, exponent, kind]);
     let starts = ABOUT_IT.into_iter().flat_map(over).collect();

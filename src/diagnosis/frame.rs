@@ -232,6 +232,13 @@ impl<'a> Frame<'a> {
         Self { sampling: self.sampling.aligned(late_s), ..self.clone() }
     }
 
+    /// The same rows, as they count here, with the base values and the timing of another axis.
+    #[must_use]
+    pub fn believing(&self, axis: &'a Axis) -> Self {
+        let believed_late_s = self.lateness.of_delay(believed_delay(axis));
+        Self { axis, belief: axis.belief(), believed_late_s, ..self.clone() }
+    }
+
     /// A regressor of every row, filtered like the torque, at the judged rows.
     #[must_use]
     pub fn judged(&self, values: &[f64]) -> Vec<f64> {

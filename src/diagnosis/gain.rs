@@ -35,7 +35,7 @@ pub struct Errors {
 }
 
 /// A machine's closed loop, as it was replayed.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Replay {
     /// The machine.
     pub axis: Axis,
@@ -81,6 +81,24 @@ pub fn on_holdout(axis: &Axis, extended: &Axis, holdout: &Holdout, watch: &Watch
     let [Some(before), Some(after)] = both.as_slice() else { return Ok([Vec::new(), Vec::new()]) };
     let judged = |errors| in_judged_rows(errors, weight);
     Ok([gains(axis, before, after, Over::All), gains(axis, &judged(before), &judged(after), Over::Most)])
+}
+
+/// The gains of the second machine over the first in some of a recording's rows.
+///
+/// # Errors
+/// [`Stopped`] when the watch's caller said so.
+pub fn where_judged(
+    machines: [&Axis; 2],
+    (observed, servo): (&Observed, &ByServo),
+    counts: &[bool],
+    watch: &Watch,
+) -> Result<Vec<Gain>, Stopped> {
+    let mut both = watch.each(&machines, (0.995, 0.999), "measuring the gain", |axis| errors(axis, observed, servo))?;
+    for error in both.iter_mut().flatten().flat_map(|errors| errors.channels.iter_mut().flatten()) {
+        error.iter_mut().zip(counts).filter(|(_, counts)| !**counts).for_each(|(error, _)| *error = f64::NAN);
+    }
+    let [Some(before), Some(after)] = both.as_slice() else { return Ok(Vec::new()) };
+    Ok(gains(machines[0], before, after, Over::All))
 }
 
 /// Another recording, on which nothing is fitted.
@@ -212,7 +230,8 @@ const NEITHER: usize = 2;
 
 /// The half that a block belongs to, by the sequence of Thue and Morse: blocks that alternate might fall in step with moves
 /// that repeat, and each half would lack what the other is judged on.
-fn half_of(block: usize) -> usize {
+#[must_use]
+pub fn half_of(block: usize) -> usize {
     block.count_ones() as usize % 2
 }
 

@@ -65,7 +65,7 @@ pub struct Judged {
     pub selection: Selection,
     /// What they are worth on held-out blocks.
     pub gains: Vec<Gain>,
-    /// A closed loop of what is named that was replayed there, where one was.
+    /// A closed loop of what is named, or of the belief, that was replayed there, where one was.
     pub replay: Option<Replay>,
     /// What explains the recording and is not named all the same.
     pub refutation: Option<String>,
@@ -165,7 +165,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             verdict: if unknown { Verdict::UnknownCause } else { Verdict::NoDiscrepancy },
             selection: Selection { fit: self.empty.clone(), rivals: Vec::new(), alike: Vec::new() },
             gains: self.held_out.gains(self.believed.as_ref(), self.believed.as_ref()),
-            replay: None,
+            replay: self.believed.as_ref().and_then(|errors| errors.replay.clone()),
             refutation: None,
             nearest: None,
         }

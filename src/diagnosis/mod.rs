@@ -11,6 +11,7 @@ mod approach;
 mod astray;
 mod belief;
 mod blocks;
+mod by_loop;
 pub mod causes;
 mod choice;
 mod columns;

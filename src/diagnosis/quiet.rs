@@ -5,6 +5,7 @@
 //! of the rows and leaves a third of such noise or less, while of white noise it leaves 0.7. What is slow, as a wrong mass, a ripple or
 //! a drift, then shows that was lost in it; what is fast no longer does, and is looked for first.
 
+use super::belief;
 use super::fit::Bench;
 use super::frame::Frame;
 use super::known::Known;
@@ -27,11 +28,11 @@ pub fn wider(frame: &Frame) -> usize {
 /// than that beside what was found.
 #[must_use]
 pub fn promises(wide: &Frame, frame: &Frame, found: &Diagnosis) -> bool {
-    let beside = |frame| Bench::new(frame, &Known::of(&found.extended, frame));
-    let quiet = beside(wide);
+    let base = belief::base_alone(&found.extended);
+    let [wide, frame] = [wide, frame].map(|frame| frame.believing(&base));
+    let [quiet, usual] = [&wide, &frame].map(|frame| Bench::new(frame, &Known::of(&found.extended, frame)));
     let left = quiet.channels(&quiet.measured)[0];
-    quiet.floors[0] < QUIETER * beside(frame).floors[0]
-        && (found.verdict == Verdict::UnknownCause || left > 1.0 + LEAST_GAIN)
+    quiet.floors[0] < QUIETER * usual.floors[0] && (found.verdict == Verdict::UnknownCause || left > 1.0 + LEAST_GAIN)
 }
 
 /// What acts about reversals only, or in instants: the low-pass smears it as it does the balance itself.

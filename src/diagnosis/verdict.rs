@@ -3,13 +3,14 @@
 //! `judge` decides what is to be named; here the answer is put together.
 
 use super::belief;
+use super::by_loop;
 use super::causes::{LAWS, Law, law};
 use super::creep;
 use super::excerpt::Excerpt;
 use super::experiment;
 use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
-use super::gain::{self, Gain, Holdout};
+use super::gain::{self, Gain, Holdout, Replay};
 use super::judge::{Excess, Judge, Judged, refutation, refuted, rms, shows};
 use super::known::Known;
 use super::narrow::{self, Band};
@@ -109,6 +110,8 @@ pub struct Diagnosis {
     pub notes: Vec<String>,
     /// The axis with its effects.
     pub extended: Axis,
+    /// A closed loop of that or of its like, as it was replayed.
+    pub(super) replay: Option<Replay>,
 }
 
 /// Diagnoses an axis on a recording; with a hold-out, the gain is measured there.
@@ -141,19 +144,19 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
     }
     let base = belief::base_alone(axis);
     let without_swings = |frame| masses.iter().fold(frame, Frame::after_first_swings);
-    let frame = without_swings(Frame::new(&base, &columns, None));
-    let missing = what_is_missing(&frame);
+    let first = without_swings(Frame::new(&base, &columns, None));
+    let missing = what_is_missing(&first);
     if !missing.is_empty() {
         return Ok(Diagnosis { notes, ..insufficient(axis, missing) });
     }
     watch.at(0.05, "reading the motion")?;
     let recorded = Recorded { axis, belief: axis, whole, holdout, watch };
-    let mut found = answer(&recorded, &frame, notes.clone())?;
+    let mut found = answer(&recorded, &first, notes.clone())?;
     // Between a motor that winds up its drive and one that drags bristles these rows do not tell.
     const YIELDING: [Cause; 3] = [Cause::PreslidingFriction, Cause::DriveCompliance, Cause::Backlash];
     let told = found.findings.iter().any(|finding| YIELDING.contains(&finding.effect.cause()));
     if !told && belief::may_be_found(axis, Cause::PreslidingFriction) {
-        if let Some(way) = creep::way(&frame) {
+        if let Some(way) = creep::way(&first) {
             let frame = without_swings(Frame::yielding_over(&base, &columns, None, way));
             if creep::promises(&frame, way, &found) {
                 let again = answer(&recorded, &frame, notes.clone())?;
@@ -163,7 +166,7 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
             }
         }
     }
-    let (mut frame, mut heard) = (frame, None);
+    let (mut frame, mut heard) = (first.clone(), None);
     for _ in 0..quiet::MOST {
         if !matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained | Verdict::UnknownCause) {
             break;
@@ -184,7 +187,7 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
         }
         frame = wide;
     }
-    Ok(found)
+    by_loop::completed(axis, (whole, holdout), &first, found, watch)
 }
 
 /// What an answer is about beside the equations.
@@ -289,7 +292,7 @@ fn answer_on(
             }
         }
     }
-    let Judged { mut verdict, selection: Selection { fit, .. }, gains, .. } = judged;
+    let Judged { mut verdict, selection: Selection { fit, .. }, gains, replay, .. } = judged;
     notes.extend(nameless(frame, &fit));
     if let Some(band) = vibration {
         verdict = band.beside(bench, verdict, &fit);
@@ -298,7 +301,7 @@ fn answer_on(
     let shown = show::views(bench, vibration.map_or(&empty, |band| &band.before), &fit);
     let unexplained = unexplained(bench, &fit, &shown, whole.table.is_some());
     watch.at(1.0, "done")?;
-    Ok(Diagnosis { verdict, findings, gains, unexplained, shown, missing: Vec::new(), notes, extended })
+    Ok(Diagnosis { verdict, findings, gains, unexplained, shown, missing: Vec::new(), notes, extended, replay })
 }
 
 /// Puts a vibration among what was found beside it, largest share first, and says what a machine file cannot have of it.
@@ -330,7 +333,8 @@ fn aligned(recorded: &Recorded, frame: &Frame, late_s: f64, mut notes: Vec<Strin
 }
 
 /// What a fit leaves of each channel; `shown` is where that of the torque lives. A scale that repeats the encoder leaves nothing.
-fn unexplained(bench: &Bench, fit: &Fit, shown: &[View], with_scale: bool) -> Unexplained {
+#[must_use]
+pub fn unexplained(bench: &Bench, fit: &Fit, shown: &[View], with_scale: bool) -> Unexplained {
     let [torque, mut table] = bench.rest(fit);
     if with_scale {
         table.resize(torque.len(), 0.0);
@@ -371,6 +375,7 @@ fn insufficient(axis: &Axis, missing: Vec<String>) -> Diagnosis {
         missing,
         notes: Vec::new(),
         extended: axis.clone(),
+        replay: None,
     }
 }
 

@@ -1,0 +1,224 @@
+//! What only the closed loop tells.
+//!
+//! A servo answers all that its axis does, and the position shows it to a few steps of the encoder. A small clearance, friction that
+//! builds up over some micrometres, or a motor that gives less at its peak act in few rows, which the low-pass of the torque smears. The
+//! replayed loop then misses the measured position by many steps of the encoder. Where it does, each cause is tried in the loop itself:
+//! with numbers that one half of the recording gives it must explain much of what is missed in the other half, and the torque must not
+//! gainsay it. What acts in all rows the torque tells as well, and better: the loop is so keen that a thousandth of the friction shows,
+//! which no law holds to. Such causes are tried as rivals alone. A servo that is another one than is believed is no cause of the
+//! vocabulary, and none explains what it makes.
+
+mod replays;
+mod trial;
+
+use super::belief;
+use super::causes::{LAWS, Law, law};
+use super::excerpt::Excerpt;
+use super::experiment;
+use super::fit::Bench;
+use super::frame::{Columns, Frame};
+use super::gain::{self, Holdout};
+use super::judge::{Excess, LITTLE_LEFT, TOLERABLE_EXCESS, refuted, rms, shows};
+use super::known::Known;
+use super::progress::{Stopped, Watch};
+use super::show;
+use super::verdict::{Diagnosis, Finding, Verdict, unexplained};
+use crate::machine::{Axis, Cause};
+use crate::plant::added::ByServo;
+use replays::{BLOCKS, Over, Replays, floor_of, mean, misses};
+use trial::{Refined, Trial, starts};
+
+/// Misses from which on the loop has something to say: the block in the middle is missed by more than twice what the encoder is off by.
+const MUCH: f64 = 0.9;
+/// The miss of a block by no more than the encoder itself is off by.
+const NOTHING: f64 = 0.35;
+/// Share of the misses beyond that which a cause must explain in rows that gave none of its numbers.
+const LEAST_EXPLAINED: f64 = 0.4;
+/// Mean over scatter of what it gains in each block, times √blocks.
+const SURELY: f64 = 3.0;
+/// Share of the best cause's gain from which on another one is not told from it, and may itself be the one.
+const ALIKE: f64 = 0.8;
+/// Share of the best start's gain from which on another cause is refined beside it.
+const RIVAL: f64 = 0.25;
+/// What acts about reversals: where one of these is there the loop misses by what its numbers are off by, for which another stands in.
+const ABOUT_REVERSALS: [Cause; 4] =
+    [Cause::StribeckFriction, Cause::PreslidingFriction, Cause::Backlash, Cause::DriveCompliance];
+/// Causes that are refined.
+const TRIED: usize = 3;
+/// The halves that give a cause its numbers and that judge it.
+const GIVES: Over = Over::Half(0);
+const JUDGES: Over = Over::Half(1);
+
+const STAGE: &str = "asking the closed loop";
+
+/// An answer with what only the loop tells beside it, where its machine was replayed; `frame` is what the torque is judged on.
+///
+/// # Errors
+/// [`Stopped`] when the watch's caller said so.
+pub fn completed(
+    axis: &Axis,
+    (whole, holdout): (&Columns, Option<&Excerpt>),
+    frame: &Frame,
+    found: Diagnosis,
+    watch: &Watch,
+) -> Result<Diagnosis, Stopped> {
+    let open = matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained | Verdict::UnknownCause);
+    let silent = !open || found.extended.effects.iter().any(|effect| ABOUT_REVERSALS.contains(&effect.cause()));
+    let Some(known) = found.replay.as_ref().filter(|_| !silent) else { return Ok(found) };
+    let at_first = misses(&known.error, floor_of(&whole.position));
+    let much = mean(&at_first, GIVES).min(mean(&at_first, JUDGES)) >= MUCH;
+    let Some(observed) = much.then(|| whole.observed()).flatten() else { return Ok(found) };
+    let base = belief::base_alone(&found.extended);
+    let frame = &frame.believing(&base);
+    let servo = ByServo::of(axis, &observed);
+    let recording = (&observed, &servo);
+    let Some(replays) = Replays::new(recording, known) else { return Ok(found) };
+    let Some(told) = told(axis, &replays, frame, &found.extended, watch)? else { return Ok(found) };
+    let extended = belief::extended(&found.extended, &[told.finding.effect]);
+    let elsewhere = holdout.and_then(|holdout| Holdout::new(axis, holdout.columns.as_ref().ok()?));
+    let gains = match elsewhere {
+        Some(rows) => {
+            let [gains, in_judged_rows] = gain::on_holdout(axis, &extended, &rows, watch)?;
+            if shows(&in_judged_rows) && refuted(&in_judged_rows, &extended.effects) {
+                return Ok(found);
+            }
+            gains
+        }
+        None => gain::where_judged([axis, &told.by_half], recording, &replays.lies_in(JUDGES), watch)?,
+    };
+    let base = belief::base_alone(&extended);
+    let frame = &frame.believing(&base);
+    let bench = Bench::new(frame, &Known::of(&extended, frame));
+    let left = bench.fit(Vec::new());
+    let unexplained = unexplained(&bench, &left, &show::views(&bench, &left, &left), whole.table.is_some());
+    let Diagnosis { mut findings, mut notes, .. } = found;
+    notes.push(told.note);
+    let rest = 1.0 - findings.iter().map(|finding| finding.share).sum::<f64>().min(1.0);
+    findings.push(Finding { share: rest * told.finding.share, ..told.finding });
+    findings.sort_by(|a, b| b.share.total_cmp(&a.share));
+    Ok(Diagnosis { verdict: Verdict::Explained, findings, gains, unexplained, notes, extended, ..found })
+}
+
+/// What the loop tells.
+struct Told {
+    finding: Finding,
+    /// What a reader is told of how it was found.
+    note: String,
+    /// The machine with it by numbers from one half of the recording.
+    by_half: Axis,
+}
+
+/// What the loop tells beside a machine.
+fn told(
+    axis: &Axis,
+    replays: &Replays,
+    frame: &Frame,
+    extended: &Axis,
+    watch: &Watch,
+) -> Result<Option<Told>, Stopped> {
+    let Some(before) = replays.error(extended) else { return Ok(None) };
+    let misses = replays.misses(&before);
+    if mean(&misses, GIVES).min(mean(&misses, JUDGES)) < MUCH {
+        return Ok(None);
+    }
+    let best = promising(axis, &replays.beginning(), frame, extended, watch)?;
+    let enough = |over| LEAST_EXPLAINED * (mean(&misses, over) - NOTHING);
+    let refined = watch.each(&best, (0.99, 0.995), STAGE, |trial| {
+        let refined = trial.clone().refined(frame, extended, replays, GIVES, enough(GIVES))?;
+        let gained: Vec<f64> = misses.iter().zip(replays.misses(&refined.error)).map(|(b, a)| b - a).collect();
+        Some((mean(&gained, JUDGES), gained, refined))
+    })?;
+    let mut refined: Vec<(f64, Vec<f64>, Refined)> = refined.into_iter().flatten().collect();
+    refined.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let Some((gain, gained, half)) = refined.first() else { return Ok(None) };
+    let explains =
+        *gain >= enough(JUDGES) && is_sure(gained) && half.trial.acts_in_few_rows() && !half.trial.is_stopped();
+    let by_half = half.trial.on(frame, extended).filter(|with| explains && !is_gainsaid(frame, extended, with));
+    let Some(by_half) = by_half else { return Ok(None) };
+    let alike = refined[1..].iter().filter(|other| other.0 > ALIKE * gain);
+    let alike: Vec<Cause> = alike.map(|other| other.2.trial.law.cause).collect();
+    let Some(whole) = half.trial.clone().refined(frame, extended, replays, Over::All, 0.0) else { return Ok(None) };
+    let Some((effect, deviations)) = whole.effect(frame, extended) else { return Ok(None) };
+    let cause = effect.cause();
+    let finding = Finding {
+        effect,
+        deviations,
+        confidence: 0.9999,
+        share: 1.0 - (-2.0 * gain).exp(),
+        evidence: (law(cause).sentence)(&effect, frame.axis),
+        next_experiment: alike.first().map(|other| experiment::telling(frame, cause, *other)),
+        indistinguishable_from: alike,
+    };
+    let [missed, left] = [&before, &whole.error].map(|error| 1e3 * rms(error));
+    let unit = if frame.axis.drive.is_rotary() { "thousandths of a degree" } else { "µm" };
+    let note = format!(
+        "{} is told by the closed loop, not by the torque: replayed without it the loop misses the measured position by {missed:.3} {unit}, with it by {left:.3} {unit}",
+        cause.name()
+    );
+    Ok(Some(Told { finding, note, by_half }))
+}
+
+/// The causes that take most off what a machine misses in the beginning of the recording, each where it takes most.
+fn promising(
+    axis: &Axis,
+    replays: &Replays,
+    frame: &Frame,
+    extended: &Axis,
+    watch: &Watch,
+) -> Result<Vec<Trial>, Stopped> {
+    let Some(before) = replays.error(extended) else { return Ok(Vec::new()) };
+    let missed = |error: &[f64]| mean(&replays.misses(error), GIVES);
+    let named = |law: &Law| extended.effects.iter().any(|effect| effect.cause() == law.cause);
+    let open = LAWS.iter().copied().filter(|law| belief::may_be_found(axis, law.cause) && !named(law));
+    let trials: Vec<Trial> = open.flat_map(|law| starts(frame, law)).collect();
+    let sized = watch.each(&trials, (0.98, 0.985), STAGE, |trial| {
+        let (trial, error) = trial.clone().sized(frame, extended, replays, &before, GIVES)?;
+        Some((missed(&error), trial))
+    })?;
+    let mut sized: Vec<(f64, Trial)> = sized.into_iter().flatten().collect();
+    sized.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut best: Vec<Trial> = Vec::new();
+    for (_, trial) in sized {
+        // A clearance whose numbers are not yet right shows nothing, and may be all the same.
+        let tried = best.len() < TRIED || trial.law.cause == Cause::Backlash;
+        if tried && best.iter().all(|other| other.law.cause != trial.law.cause) {
+            best.push(trial);
+        }
+    }
+    let siblings: Vec<Trial> = best.iter().flat_map(Trial::with_siblings).collect();
+    let missed = watch
+        .each(&siblings, (0.985, 0.99), STAGE, |trial| Some(missed(&replays.error(&trial.on(frame, extended)?)?)))?;
+    let nearest = |own: &Trial| {
+        let alike = siblings.iter().zip(&missed).filter(|(other, _)| other.law.cause == own.law.cause);
+        let known = alike.filter_map(|(other, missed)| Some((missed.as_ref()?, other)));
+        known.min_by(|a, b| a.0.total_cmp(b.0)).map(|(missed, other)| (*missed, other.clone()))
+    };
+    let mut near: Vec<(f64, Trial)> = best.iter().filter_map(nearest).collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let gain = |missed: f64| mean(&replays.misses(&before), GIVES) - missed;
+    // What gains little beside the best is no rival of it.
+    let most = near.first().map_or(0.0, |(missed, _)| gain(*missed));
+    Ok(near.into_iter().filter(|(missed, _)| gain(*missed) >= RIVAL * most).map(|(_, trial)| trial).collect())
+}
+
+/// Whether what is gained in each block of those that judge is no chance.
+fn is_sure(gained: &[f64]) -> bool {
+    let judging: Vec<f64> = (0..BLOCKS).filter(|block| JUDGES.has(*block)).map(|block| gained[block]).collect();
+    let count = judging.len() as f64;
+    let middle = judging.iter().sum::<f64>() / count;
+    let scatter = (judging.iter().map(|g| (g - middle).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
+    middle * count.sqrt() > SURELY * scatter
+}
+
+/// Whether the torque gainsays a machine with a cause more: it then is off by more than noise, and by more than before.
+fn is_gainsaid(frame: &Frame, before: &Axis, with: &Axis) -> bool {
+    let excess = |axis: &Axis| {
+        let base = belief::base_alone(axis);
+        let frame = frame.believing(&base);
+        let bench = Bench::new(&frame, &Known::of(axis, &frame));
+        let left = bench.fit(Vec::new());
+        Excess::of(&bench, &left, &left).largest()
+    };
+    let after = excess(with);
+    after > LITTLE_LEFT && (after > TOLERABLE_EXCESS || after > excess(before))
+}

@@ -1,0 +1,141 @@
+//! The closed loop of a recording, replayed with one machine after the other, and how far each misses the measured position.
+
+use crate::analysis::statistics;
+use crate::diagnosis::gain::{Replay, half_of};
+use crate::machine::Axis;
+use crate::plant::added::ByServo;
+use crate::plant::closed_loop::{Part, rows_of_the_beginning};
+use crate::plant::observed::Observed;
+use std::ops::Range;
+
+/// Contiguous blocks of rows. Each counts alike: where an axis that sticks breaks loose a cycle sooner or later one of them holds more
+/// error than all others.
+pub const BLOCKS: usize = 48;
+/// Most plant steps of a replay: 40 s at the usual ones. Longer steps are no help, they put impacts elsewhere.
+const MOST_STEPS: usize = 1_600_000;
+/// The same where causes are tried that may not be worth it.
+const MOST_STEPS_TRIED: usize = 600_000;
+/// The beginning, of which nobody knows how the servo stood, is no larger part of the rows than one in so many.
+const MOST_OF_ROWS: usize = 4;
+
+/// Which blocks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Over {
+    /// One half, or the other.
+    Half(usize),
+    All,
+}
+
+impl Over {
+    /// Whether a block is one of them.
+    #[must_use]
+    pub fn has(self, block: usize) -> bool {
+        self == Over::All || self == Over::Half(half_of(block))
+    }
+}
+
+/// What stays the same while machines are replayed.
+pub struct Replays<'r> {
+    known: &'r Replay,
+    recording: (&'r Observed, &'r ByServo),
+    part: Part,
+    begun: usize,
+    /// What the encoder itself is off by, and the whole way of the axis, load units.
+    floor: f64,
+    stroke: f64,
+}
+
+impl<'r> Replays<'r> {
+    /// Of a recording whose loop was replayed once; `None` where that cannot be told from anything.
+    #[must_use]
+    pub fn new(recording: (&'r Observed, &'r ByServo), known: &'r Replay) -> Option<Self> {
+        let observed = recording.0;
+        let whole = Part::of_steps(&known.axis, observed, MOST_STEPS, 1.0);
+        let part = Part { rows: whole.rows.min(known.error.len()), ..whole };
+        let rows = part.rows;
+        let begun = rows_of_the_beginning(known.axis.servo.as_ref()?, observed).min(rows / MOST_OF_ROWS);
+        let floor = floor_of(&observed.position);
+        if !(floor > 0.0) || rows - begun < 10 * BLOCKS {
+            return None;
+        }
+        let known_ones = observed.position.iter().copied().filter(|x| x.is_finite());
+        let (low, high) = known_ones.fold((f64::MAX, f64::MIN), |(low, high), x| (x.min(low), x.max(high)));
+        Some(Self { known, recording, part, begun, floor, stroke: high - low })
+    }
+
+    /// The same of fewer rows, for what is to be quick.
+    #[must_use]
+    pub fn beginning(&self) -> Self {
+        let short = Part::of_steps(&self.known.axis, self.recording.0, MOST_STEPS_TRIED, 1.0);
+        let rows = short.rows.max(self.begun + 10 * BLOCKS).min(self.part.rows);
+        Self { part: Part { rows, ..short }, ..*self }
+    }
+
+    /// Measured less replayed position of a machine with the ripples of the known one, after the beginning; rows that are not known miss
+    /// nothing. `None` where the replay runs away.
+    #[must_use]
+    pub fn error(&self, axis: &Axis) -> Option<Vec<f64>> {
+        let replayed = self.known.manner.replayed(axis, self.recording, self.part, &[]).ok()??;
+        let rows = self.recording.0.position.iter().zip(&replayed).skip(self.begun);
+        let finite = |error: f64| if error.is_finite() { error } else { 0.0 };
+        let error: Vec<f64> = rows.map(|(measured, replayed)| finite(measured - replayed)).collect();
+        error.iter().all(|error| error.abs() < self.stroke).then_some(error)
+    }
+
+    /// The rows of each block after the beginning.
+    #[must_use]
+    pub fn blocks(&self) -> Vec<Range<usize>> {
+        blocks_of(self.part.rows - self.begun).collect()
+    }
+
+    /// How far each block is missed, see [`misses`].
+    #[must_use]
+    pub fn misses(&self, error: &[f64]) -> Vec<f64> {
+        misses(error, self.floor)
+    }
+
+    /// The weight by which the squares of each block count, so that all count alike.
+    #[must_use]
+    pub fn weights(&self, error: &[f64]) -> Vec<f64> {
+        let weight = |rows: Range<usize>| (mean_square(&error[rows]) + self.floor.powi(2)).recip();
+        self.blocks().into_iter().map(weight).collect()
+    }
+
+    /// Which rows of the recording lie in blocks of one half or the other.
+    #[must_use]
+    pub fn lies_in(&self, over: Over) -> Vec<bool> {
+        let mut lies = vec![false; self.recording.0.time_s.len()];
+        for (_, rows) in self.blocks().into_iter().enumerate().filter(|(block, _)| over.has(*block)) {
+            lies[rows.start + self.begun..rows.end + self.begun].fill(true);
+        }
+        lies
+    }
+}
+
+/// Mean over some blocks.
+#[must_use]
+pub fn mean(of_blocks: &[f64], over: Over) -> f64 {
+    let blocks = || of_blocks.iter().enumerate().filter(|(block, _)| over.has(*block)).map(|(_, value)| value);
+    blocks().sum::<f64>() / blocks().count().max(1) as f64
+}
+
+fn blocks_of(rows: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..BLOCKS).map(move |block| block * rows / BLOCKS..(block + 1) * rows / BLOCKS)
+}
+
+fn mean_square(error: &[f64]) -> f64 {
+    error.iter().map(|e| e * e).filter(|square| square.is_finite()).sum::<f64>() / error.len().max(1) as f64
+}
+
+/// What an encoder itself is off by, by its readings, in their unit.
+#[must_use]
+pub fn floor_of(position: &[f64]) -> f64 {
+    let grid = statistics::grid(position).unwrap_or(0.0);
+    statistics::white_noise(position).unwrap_or(0.0).max(grid / 12f64.sqrt())
+}
+
+/// How far each block of rows is missed: ½·ln(1 + mean square over that of what the encoder itself is off by).
+#[must_use]
+pub fn misses(error: &[f64], floor: f64) -> Vec<f64> {
+    blocks_of(error.len()).map(|rows| 0.5 * (1.0 + mean_square(&error[rows]) / floor.powi(2)).ln()).collect()
+}

@@ -1,0 +1,347 @@
+//! A cause as it is tried in the loop: a law with numbers of its own, of which some are moved.
+
+use super::replays::{Over, Replays};
+use crate::diagnosis::belief;
+use crate::diagnosis::causes::presliding_friction::{BRISTLE, OF_ANY_EXPONENT};
+use crate::diagnosis::causes::{Law, Resistance, Rest, Scale};
+use crate::diagnosis::fit::pseudo_inverse;
+use crate::diagnosis::frame::Frame;
+use crate::diagnosis::uncertainty::{SIMULATED, widening};
+use crate::machine::{Axis, Cause, Effect};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// Share of the believed dry friction that a cause makes where it is tried first.
+const SMALL: f64 = 0.02;
+/// Small steps: of a logarithm, in steps of a linear scale, and as a share of a coefficient.
+const STEP_OF_LOG: f64 = 0.04;
+const STEPS_OF_LINEAR: f64 = 2.0;
+const STEP_OF_COEFFICIENT: f64 = 0.05;
+/// Shares of a step that are tried.
+const SHARES: [f64; 3] = [1.0, 0.5, 0.2];
+/// Of the starts of a spring one in so many is tried.
+const EVERY_SPRING: usize = 3;
+/// Shares of inertia and friction behind a clearance or a spring, and how hard flanks meet, Hz, at which it is tried: what of it the loop
+/// shows depends on them so much that no step leads from one to another.
+const TABLE: [f64; 3] = [0.25, 0.45, 0.65];
+const FRICTION: [f64; 3] = [0.35, 0.55, 0.75];
+const CONTACT_HZ: [f64; 2] = [500.0, 800.0];
+/// Steps of refining at most, and those after which it must have taken off some share of what is enough.
+const STEPS: usize = 12;
+const FEW: usize = 3;
+const HOPE: f64 = 0.25;
+/// What a step must take off the misses for another one.
+const LITTLE: f64 = 3e-3;
+/// Share of a block that stays where it alone knows of something.
+const MOST_LEFT_OUT: f64 = 0.95;
+
+/// A law with numbers.
+#[derive(Debug, Clone)]
+pub struct Trial {
+    /// Which.
+    pub law: &'static Law,
+    shape: Vec<f64>,
+    coefficients: Vec<f64>,
+    /// Whether the first coefficient is open, and whether the position goes with it in proportion.
+    open: bool,
+    linear: bool,
+}
+
+/// A number that is moved.
+#[derive(Clone, Copy)]
+enum Number {
+    Shape(usize),
+    Coefficient,
+}
+
+/// The trials of a law, each from another start; none of a law that is not tried in the loop.
+#[must_use]
+pub fn starts(frame: &Frame, law: &'static Law) -> Vec<Trial> {
+    use Cause::*;
+    let torque = vec![0.0; frame.kept.len()];
+    let all = || (law.starts)(frame, &Rest { torque: &torque, table: &[] });
+    let trial =
+        |shape: Vec<f64>, coefficients: Vec<f64>, open, linear| Trial { law, shape, coefficients, open, linear };
+    let in_proportion = |shapes: Vec<Vec<f64>>| -> Vec<Trial> {
+        let resistance = Resistance::of(frame, frame.axis);
+        let terms = law.terms(frame, &resistance, &shapes);
+        let sized = shapes.into_iter().zip(terms).filter_map(|(shape, term)| {
+            let [trace] = term.regressors.as_slice() else { return None };
+            let square = trace.torque.iter().map(|t| t * t).sum::<f64>() / trace.torque.len().max(1) as f64;
+            (square > 0.0).then(|| trial(shape, vec![SMALL * frame.belief.coulomb / square.sqrt()], true, true))
+        });
+        sized.collect()
+    };
+    match law.cause {
+        InertiaMismatch
+        | CoulombFrictionMismatch
+        | ViscousFrictionMismatch
+        | ConstantTorque
+        | DirectionDependentFriction
+        | QuadraticDrag
+        | CableForce => in_proportion(all()),
+        StribeckFriction | ThermalDrift => in_proportion(all().into_iter().step_by(3).collect()),
+        PreslidingFriction => {
+            let bristles = all().into_iter().filter(|shape| shape[1..] == BRISTLE).step_by(2);
+            let trial =
+                |shape| Trial { law: &OF_ANY_EXPONENT, ..trial(shape, vec![frame.belief.coulomb, 0.0], false, false) };
+            bristles.map(trial).collect()
+        }
+        Backlash => {
+            let mut shapes = all();
+            shapes.dedup_by(|a, b| a[0] == b[0]);
+            let usual = [TABLE[1], FRICTION[1], CONTACT_HZ[1]];
+            shapes.into_iter().map(|shape| trial([&shape[..1], &usual].concat(), vec![], false, false)).collect()
+        }
+        DriveCompliance => {
+            let starts = all().into_iter().step_by(EVERY_SPRING);
+            starts.map(|shape| trial(shape, vec![], false, false)).collect()
+        }
+        TorqueSaturation => all().into_iter().step_by(2).map(|shape| trial(shape, vec![0.7], true, false)).collect(),
+        _ => Vec::new(),
+    }
+}
+
+impl Trial {
+    /// The effect that it stands for; `None` beyond physical bounds.
+    #[must_use]
+    pub fn effect(&self, frame: &Frame) -> Option<Effect> {
+        (self.law.effect)(frame, &self.shape, &self.coefficients)
+    }
+
+    /// An axis with it.
+    #[must_use]
+    pub fn on(&self, frame: &Frame, axis: &Axis) -> Option<Axis> {
+        Some(belief::extended(axis, &[belief::together(axis, self.effect(frame)?)]))
+    }
+
+    /// Itself, and what may be the same cause with other numbers that no step leads to.
+    #[must_use]
+    pub fn with_siblings(&self) -> Vec<Self> {
+        let mut all = vec![self.clone()];
+        let with = |shape: Vec<f64>| Self { shape, ..self.clone() };
+        let shares = || TABLE.into_iter().flat_map(|table| FRICTION.map(|friction| (table, friction)));
+        match (self.law.cause, self.shape.as_slice()) {
+            (Cause::Backlash, &[width, ..]) => {
+                all.extend(
+                    shares().flat_map(|(table, friction)| CONTACT_HZ.map(|hz| with(vec![width, table, friction, hz]))),
+                );
+            }
+            (Cause::DriveCompliance, &[own, _, _, damping]) => {
+                all.extend(shares().map(|(table, friction)| with(vec![own, table, friction / table, damping])));
+            }
+            _ => {}
+        }
+        all
+    }
+
+    /// Whether it acts in few rows, and not in proportion to a number.
+    #[must_use]
+    pub fn acts_in_few_rows(&self) -> bool {
+        !self.linear
+    }
+
+    /// Whether a number has gone as far as its law lets it: what asks for more is no such cause.
+    #[must_use]
+    pub fn is_stopped(&self) -> bool {
+        let pairs = self.law.scales.iter().zip(&self.shape);
+        pairs.filter(|(scale, _)| matches!(scale, Scale::Linear(..))).any(|(scale, value)| {
+            let room = |by: f64| (scale.moved(*value, by) - value).abs() < 0.5 * scale.small();
+            room(scale.small()) || room(-scale.small())
+        })
+    }
+
+    fn numbers(&self) -> Vec<Number> {
+        let moved = |&index: &usize| {
+            let (scale, value) = (self.law.scales[index], self.shape[index]);
+            scale.small() > 0.0 && !self.law.is_as_usual(index, value)
+        };
+        let shapes = (0..self.shape.len()).filter(moved).map(Number::Shape);
+        shapes.chain(self.open.then_some(Number::Coefficient)).collect()
+    }
+
+    /// A small step of a number, in its own unit.
+    fn small(&self, number: Number) -> f64 {
+        match number {
+            Number::Shape(index) => match self.law.scales[index] {
+                Scale::Linear(_, _, unit) => STEPS_OF_LINEAR * unit,
+                _ => STEP_OF_LOG,
+            },
+            Number::Coefficient => STEP_OF_COEFFICIENT * self.coefficients[0].abs().max(1e-12),
+        }
+    }
+
+    fn moved(&self, numbers: &[Number], by: &[f64]) -> Self {
+        let mut moved = self.clone();
+        for (number, by) in numbers.iter().zip(by) {
+            match *number {
+                Number::Shape(index) => moved.shape[index] = self.law.scales[index].moved(self.shape[index], *by),
+                Number::Coefficient => moved.coefficients[0] += by,
+            }
+        }
+        moved
+    }
+
+    /// The best of its size beside a machine that misses by `before`, and the error there.
+    #[must_use]
+    pub fn sized(
+        self,
+        frame: &Frame,
+        axis: &Axis,
+        replays: &Replays,
+        before: &[f64],
+        over: Over,
+    ) -> Option<(Self, Vec<f64>)> {
+        let error = |trial: &Self| replays.error(&trial.on(frame, axis)?);
+        let there = error(&self)?;
+        if !self.linear {
+            return Some((self, there));
+        }
+        let weights = replays.weights(before);
+        let (mut along, mut square) = (0.0, 0.0);
+        for (block, rows) in replays.blocks().into_iter().enumerate().filter(|(block, _)| over.has(*block)) {
+            for (before, there) in before[rows.clone()].iter().zip(&there[rows]) {
+                let slope = before - there;
+                along += weights[block] * before * slope;
+                square += weights[block] * slope * slope;
+            }
+        }
+        let size = if square > 0.0 { along / square } else { return None };
+        let trial = Self { coefficients: vec![size * self.coefficients[0]], ..self };
+        let error = error(&trial)?;
+        Some((trial, error))
+    }
+
+    /// Moves its numbers to where some blocks are missed least (Gauss–Newton, each block by its own weight). It must take `enough` off the
+    /// misses, and is left where it is when some steps show that it will not.
+    #[must_use]
+    pub fn refined(self, frame: &Frame, axis: &Axis, replays: &Replays, over: Over, enough: f64) -> Option<Refined> {
+        let error = |trial: &Self| replays.error(&trial.on(frame, axis)?);
+        let miss = |error: &[f64]| super::replays::mean(&replays.misses(error), over);
+        let mut left = error(&self)?;
+        let mut trial = self;
+        let mut covariance = DMatrix::zeros(0, 0);
+        let before = miss(&replays.error(axis)?);
+        for step in 0..=STEPS {
+            let numbers = trial.numbers();
+            let side = |&number: &Number| {
+                let small = trial.small(number);
+                let of = |by: f64| Some((by, error(&trial.moved(&[number], &[by]))?));
+                let (by, there) = of(small).or_else(|| of(-small))?;
+                Some(left.iter().zip(&there).map(|(here, there)| (here - there) / by).collect::<Vec<f64>>())
+            };
+            let slopes: Vec<Vec<f64>> = numbers.par_iter().map(side).collect::<Option<Vec<_>>>()?;
+            let blocks = Equations::of(replays, &slopes, &left, over);
+            let by = blocks.solved()?;
+            covariance = blocks.covariance(&by)?;
+            let hopeless = step >= FEW && before - miss(&left) < HOPE * enough;
+            if step == STEPS || hopeless {
+                break;
+            }
+            let tried = SHARES.par_iter().filter_map(|share| {
+                let moved = trial.moved(&numbers, (&by * *share).as_slice());
+                let error = error(&moved)?;
+                Some((miss(&error), moved, error))
+            });
+            match tried.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                Some((less, moved, error)) if less < miss(&left) => {
+                    let little = miss(&left) - less < LITTLE;
+                    (trial, left) = (moved, error);
+                    if little {
+                        break;
+                    }
+                }
+                _ => break,
+            }
+        }
+        Some(Refined { trial, error: left, covariance })
+    }
+}
+
+/// A trial at the best of its numbers.
+pub struct Refined {
+    /// There.
+    pub trial: Trial,
+    /// What it misses by.
+    pub error: Vec<f64>,
+    /// Of the numbers that were moved.
+    covariance: DMatrix<f64>,
+}
+
+impl Refined {
+    /// The effect, and the standard deviation of each of its parameters.
+    #[must_use]
+    pub fn effect(&self, frame: &Frame, axis: &Axis) -> Option<(Effect, Vec<f64>)> {
+        let numbers = self.trial.numbers();
+        let of = |trial: &Trial| trial.effect(frame).map(|effect| belief::together(axis, effect));
+        let effect = of(&self.trial)?;
+        let values = effect.values();
+        let slope = |&number: &Number| -> Option<Vec<f64>> {
+            let small = 0.1 * self.trial.small(number);
+            let side = |by: f64| Some((by, of(&self.trial.moved(&[number], &[by]))?.values()));
+            let (by, there) = side(small).or_else(|| side(-small))?;
+            Some(there.iter().zip(&values).map(|(there, here)| (there - here) / by).collect())
+        };
+        let slopes: Vec<Vec<f64>> = numbers.iter().map(slope).collect::<Option<Vec<_>>>()?;
+        let deviation = |value: usize| {
+            let row = DVector::from_fn(slopes.len(), |number, _| slopes[number][value]);
+            (row.transpose() * &self.covariance * &row)[(0, 0)].max(0.0).sqrt()
+        };
+        let deviations = (0..values.len()).map(deviation).collect();
+        Some((effect, deviations))
+    }
+}
+
+/// Normal equations of each block.
+struct Equations {
+    blocks: Vec<(DMatrix<f64>, DVector<f64>)>,
+}
+
+impl Equations {
+    fn of(replays: &Replays, slopes: &[Vec<f64>], left: &[f64], over: Over) -> Self {
+        let (count, weights) = (slopes.len(), replays.weights(left));
+        let of_block = |(block, rows): (usize, std::ops::Range<usize>)| {
+            let product = |a: &[f64], b: &[f64]| -> f64 {
+                weights[block] * a[rows.clone()].iter().zip(&b[rows.clone()]).map(|(a, b)| a * b).sum::<f64>()
+            };
+            let normal = DMatrix::from_fn(count, count, |i, j| product(&slopes[i], &slopes[j]));
+            (normal, DVector::from_fn(count, |i, _| product(&slopes[i], left)))
+        };
+        let blocks = replays.blocks().into_iter().enumerate().filter(|(block, _)| over.has(*block));
+        Self { blocks: blocks.map(of_block).collect() }
+    }
+
+    fn sums(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let count = self.blocks.first().map_or(0, |(normal, _)| normal.nrows());
+        let none = (DMatrix::zeros(count, count), DVector::zeros(count));
+        self.blocks.iter().fold(none, |(normal, right), (n, r)| (normal + n, right + r))
+    }
+
+    /// The step that leaves least, numbers that nothing tells left where they are.
+    fn solved(&self) -> Option<DVector<f64>> {
+        let (normal, right) = self.sums();
+        Some(inverse(normal)? * right)
+    }
+
+    /// Covariance of the numbers by a jackknife over blocks, beside a step.
+    fn covariance(&self, by: &DVector<f64>) -> Option<DMatrix<f64>> {
+        let (normal, _) = self.sums();
+        let inverse = inverse(normal)?;
+        let count = self.blocks.len() as f64;
+        let mut sum = DMatrix::zeros(by.len(), by.len());
+        for (own, right) in &self.blocks {
+            let rest = DMatrix::identity(by.len(), by.len()) - MOST_LEFT_OUT * &inverse * own;
+            let change = pseudo_inverse(rest, 1e-3)? * (&inverse * (right - own * by));
+            sum += &change * change.transpose();
+        }
+        // A replay is a simulation, whose own errors are alike in all blocks.
+        Some(sum * ((count - 1.0) / count * (SIMULATED * widening(count - by.len() as f64)).powi(2)))
+    }
+}
+
+/// The inverse of normal equations, each number in its own unit.
+fn inverse(normal: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let unit = normal.diagonal().map(|square| if square > 0.0 { square.sqrt().recip() } else { 0.0 });
+    let units = DMatrix::from_diagonal(&unit);
+    Some(&units * pseudo_inverse(&units * normal * &units, 1e-6)? * &units)
+}

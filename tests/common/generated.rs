@@ -1,0 +1,72 @@
+//! A ball screw under a servo, recorded by the scoreboard's generator, which shares no code with the product, and diagnosed.
+
+use crate::board::moves::{self, Segment};
+use crate::board::random::Random;
+use crate::board::record;
+pub use crate::board::rig::{Drive, Rig, ServoGains};
+use crate::board::rough::Rough;
+#[allow(unused_imports)] // some tests name no coupling
+pub use crate::board::truth::{Coupling, Truth};
+use serde_json::Value;
+
+/// A ball screw of 10 mm under a servo of its own, with an encoder on a grid of 1 µm and a torque that is known well.
+pub fn rig() -> Rig {
+    let servo = ServoGains {
+        period: 1e-3,
+        position_gain: 25.0,
+        velocity_gain: 0.45,
+        integral_time: Some(0.04),
+        feedforward: 1.0,
+        lag: 5e-4,
+        two_sample_mean: false,
+    };
+    Rig {
+        drive: Drive::BallScrew,
+        gearing: 10.0,
+        unit: 10.0 / std::f64::consts::TAU,
+        inertia: 0.0028,
+        coulomb: 0.9,
+        viscous: 0.008,
+        constant: 0.0,
+        limit: 16.0,
+        servo,
+        encoder_step: 1e-3,
+        torque_noise: 0.01,
+        torque_step: 0.0,
+        table: None,
+        column: ("mm", 1.0, 6),
+        rough: Rough::NONE,
+        ..Rig::draw(&mut Random::new(1, 1), 10.0)
+    }
+}
+
+/// What is said of a rig as believed by a recording of another with something changed: verdict and named causes with their first value.
+pub fn said([believed, rig]: [&Rig; 2], seed: u64, change: impl Fn(&mut Truth)) -> (String, Vec<(String, f64)>) {
+    let mut truth = Truth::of(rig);
+    change(&mut truth);
+    let mut random = Random::new(seed, 7);
+    let mut segments = Vec::new();
+    for (to, speed) in
+        [(150.0, 200.0), (20.0, 60.0), (90.0, 250.0), (10.0, 120.0), (60.0, 20.0), (180.0, 240.0)].repeat(3)
+    {
+        segments.push(Segment::Move { to: to + random.uniform(-5.0, 5.0), speed, acceleration: 2500.0 });
+        segments.push(Segment::Dwell { time: 0.1 });
+    }
+    let command = moves::sample(10.0, &segments, rig.servo.period, 30.0, 0.02);
+    let run = record::run(rig, &truth, &command, 1e-5, &mut random);
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    run.write(rig, &at("run.csv")).unwrap();
+    std::fs::write(at("machine.json"), believed.machine_file("rig", Vec::new()).to_string()).unwrap();
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_gib"));
+    command.arg("diagnose").arg("--machine").arg(at("machine.json")).arg("--recording").arg(at("run.csv"));
+    let output = command.arg("--json").arg(at("said.json")).output().unwrap();
+    assert!(output.status.code().is_some_and(|code| code < 2), "{}", String::from_utf8_lossy(&output.stderr));
+    let said: Value = serde_json::from_str(&std::fs::read_to_string(at("said.json")).unwrap()).unwrap();
+    let finding = |finding: &Value| {
+        let first = finding["parameters"].as_object().unwrap().values().next().unwrap();
+        (finding["cause"].as_str().unwrap().to_owned(), first["value"].as_f64().unwrap())
+    };
+    let findings = said["findings"].as_array().unwrap().iter().map(finding).collect();
+    (said["verdict"].as_str().unwrap().to_owned(), findings)
+}
