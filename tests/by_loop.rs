@@ -7,17 +7,34 @@ mod board;
 #[path = "common/generated.rs"]
 mod generated;
 
-use generated::{Coupling, Rig, Truth, rig, said};
+use generated::{Coupling, Rig, ServoGains, Truth, rig, said};
 use std::f64::consts::TAU;
 
-/// The rig with a fine encoder and a torque that is hardly known.
-fn deaf() -> Rig {
-    Rig { encoder_step: 2e-4, torque_noise: 0.1, ..rig() }
+/// A rig with much friction, a fine encoder and a servo that takes its time.
+fn slow() -> Rig {
+    let servo = ServoGains {
+        position_gain: 23.0,
+        velocity_gain: 0.55,
+        integral_time: Some(0.08),
+        feedforward: 0.0,
+        lag: 0.0,
+        ..rig().servo
+    };
+    Rig {
+        inertia: 0.0053,
+        coulomb: 3.2,
+        viscous: 0.004,
+        limit: 28.0,
+        servo,
+        encoder_step: 6e-5,
+        torque_noise: 0.05,
+        ..rig()
+    }
 }
 
-/// A table with half of the mass behind a clearance, mm, whose flanks meet as hard as so many Hz.
+/// A table with most of the mass and friction behind a clearance, mm, whose flanks meet as hard as so many Hz.
 fn clearance(truth: &mut Truth, width: f64, hz: f64) {
-    let (inertia_share, friction_share) = (0.5, 0.6);
+    let (inertia_share, friction_share) = (0.6, 0.78);
     let stiffness = (TAU * hz).powi(2) * truth.inertia * inertia_share * (1.0 - inertia_share);
     let damping = 0.2 * stiffness / (TAU * hz);
     truth.coupling =
@@ -26,17 +43,17 @@ fn clearance(truth: &mut Truth, width: f64, hz: f64) {
 
 #[test]
 fn a_clearance_of_some_micrometres_is_told_by_the_loop() {
-    for (seed, width, hz) in [(1, 3e-3, 700.0), (2, 5e-3, 550.0)] {
-        let (verdict, findings) = said([&deaf(), &deaf()], seed, |truth| clearance(truth, width, hz));
+    for (seed, width, hz) in [(1, 3e-3, 800.0), (2, 4e-3, 650.0)] {
+        let (verdict, findings) = said([&slow(), &slow()], seed, |truth| clearance(truth, width, hz));
         println!("seed {seed}: {verdict} {findings:?}");
         let [(cause, um)] = findings.as_slice() else { panic!("{verdict}: {findings:?}") };
-        assert!(cause == "backlash" && (um * 1e-3 / width - 1.0).abs() < 0.1, "{cause} of {um} µm, not {width} mm");
+        assert!(cause == "backlash" && (um * 1e-3 / width - 1.0).abs() < 0.2, "{cause} of {um} µm, not {width} mm");
     }
 }
 
 #[test]
 fn friction_that_builds_up_over_some_micrometres_is_told_by_the_loop() {
-    let (verdict, findings) = said([&deaf(), &deaf()], 3, |truth| truth.presliding = 3e-3 / truth.unit);
+    let (verdict, findings) = said([&slow(), &slow()], 3, |truth| truth.presliding = 3e-3 / truth.unit);
     println!("{verdict} {findings:?}");
     let [(cause, um)] = findings.as_slice() else { panic!("{verdict}: {findings:?}") };
     assert!(cause == "presliding_friction" && (um / 3.0 - 1.0).abs() < 0.15, "{cause} {um}");
@@ -45,15 +62,15 @@ fn friction_that_builds_up_over_some_micrometres_is_told_by_the_loop() {
 #[test]
 fn another_servo_than_is_believed_is_no_cause() {
     for (seed, gain) in [(4, 0.85), (5, 1.2)] {
-        let mut believed = deaf();
+        let mut believed = slow();
         believed.servo.velocity_gain *= gain;
-        let (verdict, findings) = said([&believed, &deaf()], seed, |_| ());
+        let (verdict, findings) = said([&believed, &slow()], seed, |_| ());
         assert_eq!((verdict.as_str(), findings.as_slice()), ("no_discrepancy", &[][..]), "seed {seed}");
     }
 }
 
 #[test]
 fn a_machine_as_believed_is_told_as_such() {
-    let (verdict, findings) = said([&deaf(), &deaf()], 6, |_| ());
+    let (verdict, findings) = said([&slow(), &slow()], 6, |_| ());
     assert_eq!((verdict.as_str(), findings.as_slice()), ("no_discrepancy", &[][..]));
 }

@@ -23,7 +23,7 @@ use super::known::Known;
 use super::progress::{Stopped, Watch};
 use super::show;
 use super::verdict::{Diagnosis, Finding, Verdict, unexplained};
-use crate::machine::{Axis, Cause};
+use crate::machine::{Axis, Cause, Effect};
 use crate::plant::added::ByServo;
 use replays::{BLOCKS, Over, Replays, floor_of, mean, misses};
 use trial::{Refined, Trial, starts};
@@ -63,18 +63,25 @@ pub fn completed(
     watch: &Watch,
 ) -> Result<Diagnosis, Stopped> {
     let open = matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained | Verdict::UnknownCause);
-    let silent = !open || found.extended.effects.iter().any(|effect| ABOUT_REVERSALS.contains(&effect.cause()));
+    let about = |effect: &Effect| ABOUT_REVERSALS.contains(&effect.cause());
+    // One that the torque names may stand in for another, and gives way to that.
+    let doubtful: Vec<Cause> =
+        found.findings.iter().map(|finding| finding.effect).filter(about).map(|effect| effect.cause()).collect();
+    let silent = !open || axis.effects.iter().any(about) || doubtful.len() > 1;
     let Some(known) = found.replay.as_ref().filter(|_| !silent) else { return Ok(found) };
     let at_first = misses(&known.error, floor_of(&whole.position));
     let much = mean(&at_first, GIVES).min(mean(&at_first, JUDGES)) >= MUCH;
     let Some(observed) = much.then(|| whole.observed()).flatten() else { return Ok(found) };
-    let base = belief::base_alone(&found.extended);
+    let stays = found.extended.effects.iter().filter(|effect| !doubtful.contains(&effect.cause())).copied();
+    let without = found.extended.with_effects(stays.collect());
+    let base = belief::base_alone(&without);
     let frame = &frame.believing(&base);
     let servo = ByServo::of(axis, &observed);
     let recording = (&observed, &servo);
     let Some(replays) = Replays::new(recording, known) else { return Ok(found) };
-    let Some(told) = told(axis, &replays, frame, &found.extended, watch)? else { return Ok(found) };
-    let extended = belief::extended(&found.extended, &[told.finding.effect]);
+    let told = told(axis, &replays, frame, [&found.extended, &without], watch)?;
+    let Some(told) = told.filter(|told| !doubtful.contains(&told.finding.effect.cause())) else { return Ok(found) };
+    let extended = belief::extended(&without, &[told.finding.effect]);
     let elsewhere = holdout.and_then(|holdout| Holdout::new(axis, holdout.columns.as_ref().ok()?));
     let gains = match elsewhere {
         Some(rows) => {
@@ -93,6 +100,7 @@ pub fn completed(
     let unexplained = unexplained(&bench, &left, &show::views(&bench, &left, &left), whole.table.is_some());
     let Diagnosis { mut findings, mut notes, .. } = found;
     notes.push(told.note);
+    findings.retain(|finding| !doubtful.contains(&finding.effect.cause()));
     let rest = 1.0 - findings.iter().map(|finding| finding.share).sum::<f64>().min(1.0);
     findings.push(Finding { share: rest * told.finding.share, ..told.finding });
     findings.sort_by(|a, b| b.share.total_cmp(&a.share));
@@ -108,15 +116,15 @@ struct Told {
     by_half: Axis,
 }
 
-/// What the loop tells beside a machine.
+/// What the loop tells beside the second machine, and better than the first does.
 fn told(
     axis: &Axis,
     replays: &Replays,
     frame: &Frame,
-    extended: &Axis,
+    [named, extended]: [&Axis; 2],
     watch: &Watch,
 ) -> Result<Option<Told>, Stopped> {
-    let Some(before) = replays.error(extended) else { return Ok(None) };
+    let Some(before) = replays.error(named) else { return Ok(None) };
     let misses = replays.misses(&before);
     if mean(&misses, GIVES).min(mean(&misses, JUDGES)) < MUCH {
         return Ok(None);
@@ -133,7 +141,7 @@ fn told(
     let Some((gain, gained, half)) = refined.first() else { return Ok(None) };
     let explains =
         *gain >= enough(JUDGES) && is_sure(gained) && half.trial.acts_in_few_rows() && !half.trial.is_stopped();
-    let by_half = half.trial.on(frame, extended).filter(|with| explains && !is_gainsaid(frame, extended, with));
+    let by_half = half.trial.on(frame, extended).filter(|with| explains && !is_gainsaid(frame, named, with));
     let Some(by_half) = by_half else { return Ok(None) };
     let alike = refined[1..].iter().filter(|other| other.0 > ALIKE * gain);
     let alike: Vec<Cause> = alike.map(|other| other.2.trial.law.cause).collect();
