@@ -230,3 +230,77 @@ fn is_gainsaid(frame: &Frame, before: &Axis, with: &Axis) -> bool {
     let after = excess(with);
     after > LITTLE_LEFT && (after > TOLERABLE_EXCESS || after > excess(before))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::gain::HeldOut;
+    use crate::diagnosis::verdict::{Left, Unexplained};
+    use crate::machine::Machine;
+    use crate::plant::moves::{Moves, Reach};
+    use crate::plant::simulate::{Sensors, Setup, simulate};
+    use crate::recording::{Column, Recording};
+
+    /// What the loop adds to an answer that found nothing, of the rig of the demonstration with effects.
+    fn told(effects: &[Effect]) -> Vec<Effect> {
+        let belief = Machine::parse(include_str!("../../examples/machines/believed.json")).unwrap().axes.remove(0);
+        let reach = Reach { start: 20.0, stroke: 200.0, speed: 250.0, acceleration: 2500.0 };
+        let mut command = Moves::built_in("test", &reach).unwrap().command(1e-3);
+        command.truncate(20_000);
+        let sensors = Sensors { grid_um: 0.05, torque_noise: 0.3, ..Sensors::default() };
+        let truth = belief.with_effects(effects.to_vec());
+        let trace = simulate(&truth, &command, &Setup { seed: 1, sensors, ..Setup::default() }).unwrap();
+        let columns = vec![
+            Column::new("x.position_command_mm", trace.command),
+            Column::new("x.position_mm", trace.position),
+            Column::new("x.torque_nm", trace.torque),
+        ];
+        let excerpt = Excerpt::of(&Recording::from_columns("simulated", trace.time_s, columns).unwrap(), &belief);
+        let whole = excerpt.columns.as_ref().unwrap();
+        let (base, thinned) = (belief::base_alone(&belief), whole.clone().thinned());
+        let frame = Frame::new(&base, &thinned, None);
+        let bench = Bench::new(&frame, &Known::of(&belief, &frame));
+        let watch = Watch::new(&|_, _| true);
+        let believed = HeldOut::new([&belief, &belief], whole, &bench, &watch).believed();
+        let silent = Diagnosis {
+            verdict: Verdict::NoDiscrepancy,
+            findings: Vec::new(),
+            gains: Vec::new(),
+            unexplained: Unexplained {
+                torque: Left { rms: 0.0, noise_rms: 0.0, describes: String::new() },
+                table: None,
+            },
+            shown: Vec::new(),
+            missing: Vec::new(),
+            notes: Vec::new(),
+            extended: belief.clone(),
+            replay: believed.unwrap().replay,
+        };
+        let answer = completed(&belief, (whole, None), &frame, silent, &watch).unwrap();
+        answer.findings.iter().map(|finding| finding.effect).collect()
+    }
+
+    #[test]
+    fn a_clearance_that_the_torque_does_not_show_is_told() {
+        let hidden =
+            Effect::Backlash { width_um: 5.0, table_inertia_share: 0.4, table_friction_share: 0.6, contact_hz: 600.0 };
+        let told = told(&[hidden]);
+        let [Effect::Backlash { width_um, .. }] = told.as_slice() else { panic!("{told:?}") };
+        assert!((width_um / 5.0 - 1.0).abs() < 0.1, "{width_um}");
+    }
+
+    #[test]
+    fn friction_that_builds_up_is_told() {
+        let hidden =
+            Effect::PreslidingFriction { displacement_um: 4.0, exponent: 1.0, maxwell_slip: 0.0, micro_damping_s: 0.0 };
+        let told = told(&[hidden]);
+        let [Effect::PreslidingFriction { displacement_um, .. }] = told.as_slice() else { panic!("{told:?}") };
+        assert!((displacement_um / 4.0 - 1.0).abs() < 0.1, "{displacement_um}");
+    }
+
+    #[test]
+    fn what_acts_in_all_rows_is_the_torques_to_tell() {
+        assert_eq!(told(&[]), []);
+        assert_eq!(told(&[Effect::CoulombFrictionMismatch { torque: 0.95 }]), []);
+    }
+}

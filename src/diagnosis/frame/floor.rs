@@ -26,10 +26,16 @@ impl Frame<'_> {
                     seconds[groups[k]].push((values[k - m] - 2.0 * values[k] + values[k + m]).abs());
                 }
             }
-            let all = seconds.iter().map(Vec::len).sum::<usize>() as f64;
-            let square = |own: &Vec<f64>| Some(own.len() as f64 / all * median(own)?.powi(2));
-            let squares: f64 = seconds.iter().filter_map(square).sum();
-            (all > 0.0).then(|| 1.482_602 * squares.sqrt() / gain)
+            let count = seconds.iter().map(Vec::len).sum::<usize>() as f64;
+            let square = |own: &Vec<f64>| Some((own.len() as f64 / count, median(own)?.powi(2)));
+            let squares: Vec<(f64, f64)> = seconds.iter().filter_map(square).collect();
+            // A torque that stands still on its grid in most rows of a group says nothing of its noise there.
+            let square = if squares.iter().any(|(_, square)| *square == 0.0) {
+                median(&seconds.concat())?.powi(2)
+            } else {
+                squares.iter().map(|(share, square)| share * square).sum()
+            };
+            (count > 0.0).then(|| 1.482_602 * f64::sqrt(square) / gain)
         };
         // Noise of the encoder's grid alternates from row to row and looks large at the least spacing, structure at wide
         // ones: the smallest estimate is the one least spoilt.
