@@ -26,7 +26,7 @@ fn slow() -> Rig {
         viscous: 0.004,
         limit: 28.0,
         servo,
-        encoder_step: 6e-5,
+        encoder_step: 7.3e-5,
         torque_noise: 0.1,
         ..rig()
     }

@@ -9,9 +9,8 @@ use crate::diagnosis::fit::{Bench, Fit, Part};
 /// Share of its size up to which the trace of a start is suspected: starts differ from what is there by half of that, in mass or stiffness.
 const LITTLE: f64 = 0.25;
 /// How much more of the squares a table takes off in the fifth of the rows where the axis accelerates most than in the half where it does
-/// least: they differ by three times in acceleration on any moves, and what a spring makes goes with that. One that is as large as it
-/// should be takes more off there in any case.
-const MORE: [f64; 2] = [10.0, 1.0];
+/// least: they differ by three times in acceleration on any moves, and what a spring makes goes with that.
+const MORE: f64 = 10.0;
 /// Rows to either side that an acceleration is averaged over, lest its own noise say where it is large.
 const BESIDE: usize = 4;
 
@@ -19,6 +18,9 @@ const BESIDE: usize = 4;
 #[must_use]
 pub fn drives(bench: &Bench, set: &Fit, start: &Part) -> bool {
     let (size, left) = bench.left_joined(set, start);
+    if size > LITTLE {
+        return false;
+    }
     let rows = bench.rows;
     let taken: Vec<f64> =
         set.residual[..rows].iter().zip(&left[..rows]).map(|(before, after)| before * before - after * after).collect();
@@ -26,7 +28,7 @@ pub fn drives(bench: &Bench, set: &Fit, start: &Part) -> bool {
     order.truncate(rows);
     let mean = |of: &[usize]| of.iter().map(|&row| taken[row]).sum::<f64>() / of.len().max(1) as f64;
     let (gentle, hard) = (mean(&order[..rows / 2]), mean(&order[rows - rows / 5..]));
-    if size > LITTLE { gentle > 0.0 && hard <= MORE[1] * gentle } else { hard <= MORE[0] * gentle.max(0.0) }
+    hard <= MORE * gentle.max(0.0)
 }
 
 /// Rows by the size of the acceleration about them, the least first.
