@@ -205,6 +205,13 @@ fn friction_that_yields_over_a_micrometre_is_seen_where_the_axis_creeps() {
     named_alone("presliding_friction", &[(8118, 22), (8118, 32), (8118, 33)]);
 }
 
+/// A clearance that the low-pass of the torque smears is told by the closed loop alone: without it nothing is found here.
+#[test]
+fn a_clearance_that_only_the_loop_shows_is_named() {
+    let summary = summarise(&all_diagnosed(&[(7711, 16, Kind::One("backlash"))], 12.0, true));
+    assert_eq!((summary.failures, summary.first_right, summary.wrong_beside), (0, (1, 1), (0, 1)));
+}
+
 /// Encoder noise, friction of other formulations and pulses on the torque are no faults, and hide none.
 #[test]
 fn rough_rigs_raise_no_alarm() {

@@ -30,6 +30,13 @@ pub fn deviation(values: &[f64]) -> f64 {
     (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt()
 }
 
+/// Mean of a sample over what that may be off by: over the standard deviation, times √n.
+#[must_use]
+pub fn strength(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    values.iter().sum::<f64>() / n * n.sqrt() / deviation(values).max(1e-300)
+}
+
 /// Standard deviation of white noise on a smooth signal, in the signal's unit: the fourth difference removes what a cubic
 /// follows within five rows, and white noise of standard deviation s leaves it with s·√70.
 /// (von Neumann's mean square successive difference, one order higher, with a median in place of the mean.)
@@ -152,6 +159,14 @@ fn expansion(freedom: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_mean_is_as_strong_as_its_scatter_and_number_make_it() {
+        // Mean 2, deviation 1, of four.
+        let around = (1.5f64).sqrt() / 2f64.sqrt();
+        let values = [2.0 - around, 2.0 + around, 2.0 - around, 2.0 + around];
+        assert!((strength(&values) - 4.0).abs() < 1e-12, "{}", strength(&values));
+    }
 
     /// Numerical Recipes' `ranqd1`-like generator, good enough for noise; the seed is the argument.
     fn noise(seed: u64) -> impl FnMut() -> f64 {

@@ -12,7 +12,7 @@ mod replays;
 mod trial;
 
 use super::belief;
-use super::causes::{LAWS, Law, law};
+use super::causes::{ABOUT_REVERSALS, LAWS, Law, law};
 use super::excerpt::Excerpt;
 use super::experiment;
 use super::fit::Bench;
@@ -22,13 +22,15 @@ use super::judge::{Excess, LITTLE_LEFT, TOLERABLE_EXCESS, refuted, rms, shows};
 use super::known::Known;
 use super::progress::{Stopped, Watch};
 use super::show;
-use super::verdict::{Diagnosis, Finding, Verdict, unexplained};
+use super::verdict::{Diagnosis, Finding, Verdict, confidence, unexplained};
+use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::added::ByServo;
 use replays::{BLOCKS, Over, Replays, floor_of, mean, misses};
 use trial::{Refined, Trial, starts};
 
-/// Misses from which on the loop has something to say: the block in the middle is missed by more than twice what the encoder is off by.
+/// Misses from which on the loop has something to say: blocks are missed, in the geometric mean, by more than twice what the encoder
+/// itself is off by.
 const MUCH: f64 = 0.9;
 /// The miss of a block by no more than the encoder itself is off by.
 const NOTHING: f64 = 0.35;
@@ -40,9 +42,8 @@ const SURELY: f64 = 3.0;
 const ALIKE: f64 = 0.8;
 /// Share of the best start's gain from which on another cause is refined beside it.
 const RIVAL: f64 = 0.25;
-/// What acts about reversals: where one of these is there the loop misses by what its numbers are off by, for which another stands in.
-const ABOUT_REVERSALS: [Cause; 4] =
-    [Cause::StribeckFriction, Cause::PreslidingFriction, Cause::Backlash, Cause::DriveCompliance];
+/// Share of what is enough that some steps of refining must have taken off for more to be made.
+const HOPE: f64 = 0.25;
 /// Causes that are refined.
 const TRIED: usize = 3;
 /// The halves that give a cause its numbers and that judge it.
@@ -64,7 +65,8 @@ pub fn completed(
 ) -> Result<Diagnosis, Stopped> {
     let open = matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained | Verdict::UnknownCause);
     let about = |effect: &Effect| ABOUT_REVERSALS.contains(&effect.cause());
-    // One that the torque names may stand in for another, and gives way to that.
+    // One that the torque names may stand in for another, and gives way to that. Where more of these are there the loop misses by what
+    // their numbers are off by, for which another stands in.
     let doubtful: Vec<Cause> =
         found.findings.iter().map(|finding| finding.effect).filter(about).map(|effect| effect.cause()).collect();
     let silent = !open || axis.effects.iter().any(about) || doubtful.len() > 1;
@@ -78,7 +80,7 @@ pub fn completed(
     let frame = &frame.believing(&base);
     let servo = ByServo::of(axis, &observed);
     let recording = (&observed, &servo);
-    let Some(replays) = Replays::new(recording, known) else { return Ok(found) };
+    let Some(replays) = Replays::new(recording, known, watch) else { return Ok(found) };
     let told = told(axis, &replays, frame, [&found.extended, &without], watch)?;
     let Some(told) = told.filter(|told| !doubtful.contains(&told.finding.effect.cause())) else { return Ok(found) };
     let extended = belief::extended(&without, &[told.finding.effect]);
@@ -131,27 +133,32 @@ fn told(
     }
     let best = promising(axis, &replays.beginning(), frame, extended, watch)?;
     let enough = |over| LEAST_EXPLAINED * (mean(&misses, over) - NOTHING);
+    let hopeful = mean(&misses, GIVES) - HOPE * enough(GIVES);
     let refined = watch.each(&best, (0.99, 0.995), STAGE, |trial| {
-        let refined = trial.clone().refined(frame, extended, replays, GIVES, enough(GIVES))?;
+        let refined = trial.clone().refined(frame, extended, replays, GIVES, hopeful)?;
         let gained: Vec<f64> = misses.iter().zip(replays.misses(&refined.error)).map(|(b, a)| b - a).collect();
         Some((mean(&gained, JUDGES), gained, refined))
     })?;
     let mut refined: Vec<(f64, Vec<f64>, Refined)> = refined.into_iter().flatten().collect();
     refined.sort_by(|a, b| b.0.total_cmp(&a.0));
     let Some((gain, gained, half)) = refined.first() else { return Ok(None) };
-    let explains =
-        *gain >= enough(JUDGES) && is_sure(gained) && half.trial.acts_in_few_rows() && !half.trial.is_stopped();
+    let explains = *gain >= enough(JUDGES)
+        && strength(gained) > SURELY
+        && half.trial.acts_in_few_rows()
+        && !half.trial.is_stopped();
     let by_half = half.trial.on(frame, extended).filter(|with| explains && !is_gainsaid(frame, named, with));
     let Some(by_half) = by_half else { return Ok(None) };
     let alike = refined[1..].iter().filter(|other| other.0 > ALIKE * gain);
     let alike: Vec<Cause> = alike.map(|other| other.2.trial.law.cause).collect();
-    let Some(whole) = half.trial.clone().refined(frame, extended, replays, Over::All, 0.0) else { return Ok(None) };
+    let Some(whole) = half.trial.clone().refined(frame, extended, replays, Over::All, f64::INFINITY) else {
+        return Ok(None);
+    };
     let Some((effect, deviations)) = whole.effect(frame, extended) else { return Ok(None) };
     let cause = effect.cause();
     let finding = Finding {
         effect,
         deviations,
-        confidence: 0.9999,
+        confidence: confidence(strength(gained)),
         share: 1.0 - (-2.0 * gain).exp(),
         evidence: (law(cause).sentence)(&effect, frame.axis),
         next_experiment: alike.first().map(|other| experiment::telling(frame, cause, *other)),
@@ -185,23 +192,23 @@ fn promising(
     })?;
     let mut sized: Vec<(f64, Trial)> = sized.into_iter().flatten().collect();
     sized.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut best: Vec<Trial> = Vec::new();
-    for (_, trial) in sized {
+    let mut near: Vec<(f64, Trial)> = Vec::new();
+    for (missed, trial) in sized {
         // A clearance whose numbers are not yet right shows nothing, and may be all the same.
-        let tried = best.len() < TRIED || trial.law.cause == Cause::Backlash;
-        if tried && best.iter().all(|other| other.law.cause != trial.law.cause) {
-            best.push(trial);
+        let tried = near.len() < TRIED || trial.law.cause == Cause::Backlash;
+        if tried && near.iter().all(|(_, other)| other.law.cause != trial.law.cause) {
+            near.push((missed, trial));
         }
     }
-    let siblings: Vec<Trial> = best.iter().flat_map(Trial::with_siblings).collect();
+    let siblings: Vec<Trial> = near.iter().flat_map(|(_, trial)| trial.siblings()).collect();
     let missed = watch
         .each(&siblings, (0.985, 0.99), STAGE, |trial| Some(missed(&replays.error(&trial.on(frame, extended)?)?)))?;
-    let nearest = |own: &Trial| {
-        let alike = siblings.iter().zip(&missed).filter(|(other, _)| other.law.cause == own.law.cause);
-        let known = alike.filter_map(|(other, missed)| Some((missed.as_ref()?, other)));
-        known.min_by(|a, b| a.0.total_cmp(b.0)).map(|(missed, other)| (*missed, other.clone()))
-    };
-    let mut near: Vec<(f64, Trial)> = best.iter().filter_map(nearest).collect();
+    for (sibling, missed) in siblings.into_iter().zip(missed) {
+        let own = near.iter_mut().find(|(_, own)| own.law.cause == sibling.law.cause);
+        if let Some((own, missed)) = own.zip(missed).filter(|(own, missed)| missed < &own.0) {
+            *own = (missed, sibling);
+        }
+    }
     near.sort_by(|a, b| a.0.total_cmp(&b.0));
     let gain = |missed: f64| mean(&replays.misses(&before), GIVES) - missed;
     // What gains little beside the best is no rival of it.
@@ -209,13 +216,10 @@ fn promising(
     Ok(near.into_iter().filter(|(missed, _)| gain(*missed) >= RIVAL * most).map(|(_, trial)| trial).collect())
 }
 
-/// Whether what is gained in each block of those that judge is no chance.
-fn is_sure(gained: &[f64]) -> bool {
+/// Mean over scatter, times √blocks, of what is gained in each block of those that judge.
+fn strength(gained: &[f64]) -> f64 {
     let judging: Vec<f64> = (0..BLOCKS).filter(|block| JUDGES.has(*block)).map(|block| gained[block]).collect();
-    let count = judging.len() as f64;
-    let middle = judging.iter().sum::<f64>() / count;
-    let scatter = (judging.iter().map(|g| (g - middle).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
-    middle * count.sqrt() > SURELY * scatter
+    statistics::strength(&judging)
 }
 
 /// Whether the torque gainsays a machine with a cause more: it then is off by more than noise, and by more than before.

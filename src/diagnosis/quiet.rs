@@ -6,6 +6,7 @@
 //! a drift, then shows that was lost in it; what is fast no longer does, and is looked for first.
 
 use super::belief;
+use super::causes::ABOUT_REVERSALS;
 use super::fit::Bench;
 use super::frame::Frame;
 use super::known::Known;
@@ -36,8 +37,9 @@ pub fn promises(wide: &Frame, frame: &Frame, found: &Diagnosis) -> bool {
 }
 
 /// What acts about reversals only, or in instants: the low-pass smears it as it does the balance itself.
-const FAST: [Cause; 5] =
-    [Cause::StribeckFriction, Cause::PreslidingFriction, Cause::Backlash, Cause::DriveCompliance, Cause::DeadTime];
+fn is_fast(cause: Cause) -> bool {
+    ABOUT_REVERSALS.contains(&cause) || cause == Cause::DeadTime
+}
 
 /// Whether a quieter look has found what the look before has not: causes that explain all where none fitted, or more of them than it
 /// had. What is fast it does not add: there it stands in for what the low-pass smears.
@@ -45,7 +47,7 @@ const FAST: [Cause; 5] =
 pub fn finds_more(again: &Diagnosis, before: &Diagnosis) -> bool {
     let (found, known) = (causes(again), causes(before));
     let mut more = found.iter().filter(|cause| !known.contains(cause)).peekable();
-    let slow = more.peek().is_some() && more.all(|cause| !FAST.contains(cause));
+    let slow = more.peek().is_some() && more.all(|cause| !is_fast(*cause));
     again.verdict == Verdict::Explained
         && is_sure(again)
         && (before.verdict == Verdict::UnknownCause || slow && known.iter().all(|cause| found.contains(cause)))
@@ -55,7 +57,7 @@ pub fn finds_more(again: &Diagnosis, before: &Diagnosis) -> bool {
 /// fast as well, unless something of the kind is believed: what a low-pass smears of that looks like other numbers of it.
 #[must_use]
 pub fn agree(axis: &Axis, one: &Diagnosis, other: &Diagnosis) -> bool {
-    let believed = axis.effects.iter().any(|effect| FAST.contains(&effect.cause()));
+    let believed = axis.effects.iter().any(|effect| is_fast(effect.cause()));
     let sorted = |diagnosis: &Diagnosis| {
         let mut list = causes(diagnosis);
         list.sort();

@@ -8,6 +8,7 @@ use super::grids;
 use super::progress::{Stopped, Watch};
 use super::select::{LEAST_GAIN, LEAST_STRENGTH, once_only, price};
 use super::uncertainty;
+use crate::analysis::statistics;
 
 /// Least mean over scatter of the blocks' gains, times √blocks. What only one block shows gives exactly 1 and may count: the
 /// others predicted it, or the gain held out would not be there.
@@ -102,7 +103,6 @@ fn borne_out(bench: &Bench, less: &Fit, full: &Fit) -> bool {
     let (a, b) = (blocks::held_out(bench, less, &blocks), blocks::held_out(bench, full, &blocks));
     let gains: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
     let mean = gains.iter().sum::<f64>() / gains.len() as f64;
-    let scatter = (gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (gains.len() as f64 - 1.0)).sqrt();
     let in_sample = (less.squares() - full.squares()) / gains.len() as f64;
-    mean > 0.5 * in_sample && mean * (gains.len() as f64).sqrt() > LEAST_T * scatter
+    mean > 0.5 * in_sample && statistics::strength(&gains) > LEAST_T
 }

@@ -21,6 +21,7 @@ use super::replayed;
 use super::select::{Search, Selection};
 use super::show::{self, View};
 use super::uncertainty::{self, Sure};
+use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
 
 /// Judged time below which nothing is said, s, and judged rows.
@@ -161,7 +162,7 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
             if creep::promises(&frame, way, &found) {
                 let again = answer(&recorded, &frame, notes.clone())?;
                 if creep::is_over(way, again.findings.iter().map(|finding| finding.effect)) {
-                    return Ok(again);
+                    return watch.at(1.0, "done").map(|()| again);
                 }
             }
         }
@@ -187,7 +188,8 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
         }
         frame = wide;
     }
-    by_loop::completed(axis, (whole, holdout), &first, found, watch)
+    let found = by_loop::completed(axis, (whole, holdout), &first, found, watch)?;
+    watch.at(1.0, "done").map(|()| found)
 }
 
 /// What an answer is about beside the equations.
@@ -300,7 +302,6 @@ fn answer_on(
     }
     let shown = show::views(bench, vibration.map_or(&empty, |band| &band.before), &fit);
     let unexplained = unexplained(bench, &fit, &shown, whole.table.is_some());
-    watch.at(1.0, "done")?;
     Ok(Diagnosis { verdict, findings, gains, unexplained, shown, missing: Vec::new(), notes, extended, replay })
 }
 
@@ -422,7 +423,7 @@ fn findings(axis: &Axis, bench: &Bench, selection: &Selection, sure: Option<&Sur
         let ties = ties(bench, selection, i);
         list.push(Finding {
             evidence: (law.sentence)(&belief::together(axis, effect), bench.frame.axis),
-            confidence: confidence(bench, fit, i),
+            confidence: confidence(block_t(bench, &bench.without(fit, i), fit)),
             share: (drops[i] / sum * total).clamp(0.0, 1.0),
             next_experiment: ties.first().map(|other| experiment::telling(bench.frame, effect.cause(), *other)),
             indistinguishable_from: ties,
@@ -447,9 +448,9 @@ fn nameless(frame: &Frame, fit: &Fit) -> Option<String> {
     })
 }
 
-/// Probability that the cause's gain is not chance: Student's t over blocks, as a normal's tail.
-fn confidence(bench: &Bench, fit: &Fit, part: usize) -> f64 {
-    let t = block_t(bench, &bench.without(fit, part), fit);
+/// Probability that a cause's gain is not chance: its Student's t over blocks, as a normal's tail.
+#[must_use]
+pub fn confidence(t: f64) -> f64 {
     // Logistic approximation of the normal distribution.
     (1.0 / (1.0 + (-1.702 * t).exp())).clamp(0.0, 0.9999)
 }
@@ -469,10 +470,7 @@ pub fn block_t(bench: &Bench, less: &Fit, full: &Fit) -> f64 {
             square(less) - square(full)
         })
         .collect();
-    let n = gains.len() as f64;
-    let mean = gains.iter().sum::<f64>() / n;
-    let scatter = (gains.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-    mean * n.sqrt() / scatter.max(1e-300)
+    statistics::strength(&gains)
 }
 
 /// Causes that take the place of a part without a difference that the blocks bear out.

@@ -1,7 +1,9 @@
 //! The closed loop of a recording, replayed with one machine after the other, and how far each misses the measured position.
 
+use super::STAGE;
 use crate::analysis::statistics;
 use crate::diagnosis::gain::{Replay, half_of};
+use crate::diagnosis::progress::Watch;
 use crate::machine::Axis;
 use crate::plant::added::ByServo;
 use crate::plant::closed_loop::{Part, rows_of_the_beginning};
@@ -43,12 +45,13 @@ pub struct Replays<'r> {
     /// What the encoder itself is off by, and the whole way of the axis, load units.
     floor: f64,
     stroke: f64,
+    watch: &'r Watch<'r>,
 }
 
 impl<'r> Replays<'r> {
     /// Of a recording whose loop was replayed once; `None` where that cannot be told from anything.
     #[must_use]
-    pub fn new(recording: (&'r Observed, &'r ByServo), known: &'r Replay) -> Option<Self> {
+    pub fn new(recording: (&'r Observed, &'r ByServo), known: &'r Replay, watch: &'r Watch<'r>) -> Option<Self> {
         let observed = recording.0;
         let whole = Part::of_steps(&known.axis, observed, MOST_STEPS, 1.0);
         let part = Part { rows: whole.rows.min(known.error.len()), ..whole };
@@ -60,7 +63,7 @@ impl<'r> Replays<'r> {
         }
         let known_ones = observed.position.iter().copied().filter(|x| x.is_finite());
         let (low, high) = known_ones.fold((f64::MAX, f64::MIN), |(low, high), x| (x.min(low), x.max(high)));
-        Some(Self { known, recording, part, begun, floor, stroke: high - low })
+        Some(Self { known, recording, part, begun, floor, stroke: high - low, watch })
     }
 
     /// The same of fewer rows, for what is to be quick.
@@ -72,9 +75,10 @@ impl<'r> Replays<'r> {
     }
 
     /// Measured less replayed position of a machine with the ripples of the known one, after the beginning; rows that are not known miss
-    /// nothing. `None` where the replay runs away.
+    /// nothing. `None` where the replay runs away, and when the watch's caller said stop: replays are most of the work.
     #[must_use]
     pub fn error(&self, axis: &Axis) -> Option<Vec<f64>> {
+        self.watch.at(0.98, STAGE).ok()?;
         let replayed = self.known.manner.replayed(axis, self.recording, self.part, &[]).ok()??;
         let rows = self.recording.0.position.iter().zip(&replayed).skip(self.begun);
         let finite = |error: f64| if error.is_finite() { error } else { 0.0 };

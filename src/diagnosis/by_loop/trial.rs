@@ -26,10 +26,9 @@ const EVERY_SPRING: usize = 3;
 const TABLE: [f64; 3] = [0.25, 0.45, 0.65];
 const FRICTION: [f64; 3] = [0.35, 0.55, 0.75];
 const CONTACT_HZ: [f64; 2] = [500.0, 800.0];
-/// Steps of refining at most, and those after which it must have taken off some share of what is enough.
+/// Steps of refining at most, and those after which it must be hopeful.
 const STEPS: usize = 12;
 const FEW: usize = 3;
-const HOPE: f64 = 0.25;
 /// What a step must take off the misses for another one.
 const LITTLE: f64 = 3e-3;
 /// Share of a block that stays where it alone knows of something.
@@ -115,24 +114,21 @@ impl Trial {
         Some(belief::extended(axis, &[belief::together(axis, self.effect(frame)?)]))
     }
 
-    /// Itself, and what may be the same cause with other numbers that no step leads to.
+    /// What may be the same cause with other numbers that no step leads to.
     #[must_use]
-    pub fn with_siblings(&self) -> Vec<Self> {
-        let mut all = vec![self.clone()];
+    pub fn siblings(&self) -> Vec<Self> {
         let with = |shape: Vec<f64>| Self { shape, ..self.clone() };
         let shares = || TABLE.into_iter().flat_map(|table| FRICTION.map(|friction| (table, friction)));
         match (self.law.cause, self.shape.as_slice()) {
             (Cause::Backlash, &[width, ..]) => {
-                all.extend(
-                    shares().flat_map(|(table, friction)| CONTACT_HZ.map(|hz| with(vec![width, table, friction, hz]))),
-                );
+                let flanks = |(table, friction)| CONTACT_HZ.map(|hz| with(vec![width, table, friction, hz]));
+                shares().flat_map(flanks).collect()
             }
             (Cause::DriveCompliance, &[own, _, _, damping]) => {
-                all.extend(shares().map(|(table, friction)| with(vec![own, table, friction / table, damping])));
+                shares().map(|(table, friction)| with(vec![own, table, friction / table, damping])).collect()
             }
-            _ => {}
+            _ => Vec::new(),
         }
-        all
     }
 
     /// Whether it acts in few rows, and not in proportion to a number.
@@ -212,16 +208,15 @@ impl Trial {
         Some((trial, error))
     }
 
-    /// Moves its numbers to where some blocks are missed least (Gauss–Newton, each block by its own weight). It must take `enough` off the
-    /// misses, and is left where it is when some steps show that it will not.
+    /// Moves its numbers to where some blocks are missed least (Gauss–Newton, each block by its own weight). Some steps must have brought the
+    /// misses below `hopeful`, or it is left where it is.
     #[must_use]
-    pub fn refined(self, frame: &Frame, axis: &Axis, replays: &Replays, over: Over, enough: f64) -> Option<Refined> {
+    pub fn refined(self, frame: &Frame, axis: &Axis, replays: &Replays, over: Over, hopeful: f64) -> Option<Refined> {
         let error = |trial: &Self| replays.error(&trial.on(frame, axis)?);
         let miss = |error: &[f64]| super::replays::mean(&replays.misses(error), over);
         let mut left = error(&self)?;
         let mut trial = self;
         let mut covariance = DMatrix::zeros(0, 0);
-        let before = miss(&replays.error(axis)?);
         for step in 0..=STEPS {
             let numbers = trial.numbers();
             let side = |&number: &Number| {
@@ -234,8 +229,7 @@ impl Trial {
             let blocks = Equations::of(replays, &slopes, &left, over);
             let by = blocks.solved()?;
             covariance = blocks.covariance(&by)?;
-            let hopeless = step >= FEW && before - miss(&left) < HOPE * enough;
-            if step == STEPS || hopeless {
+            if step == STEPS || step >= FEW && miss(&left) > hopeful {
                 break;
             }
             let tried = SHARES.par_iter().filter_map(|share| {

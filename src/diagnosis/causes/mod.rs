@@ -223,6 +223,10 @@ pub static LAWS: &[&Law] = &[
     &screw_periodic_error::LAW,
 ];
 
+/// Causes that act about reversals only.
+pub const ABOUT_REVERSALS: [Cause; 4] =
+    [Cause::StribeckFriction, Cause::PreslidingFriction, Cause::Backlash, Cause::DriveCompliance];
+
 /// The law of a cause.
 #[must_use]
 pub fn law(cause: Cause) -> &'static Law {
