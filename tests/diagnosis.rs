@@ -354,6 +354,18 @@ fn an_extended_machine_survives_its_file_and_answers_no_discrepancy() {
     assert_eq!(judged_by(&again.axes[0], &r).verdict, Verdict::NoDiscrepancy);
 }
 
+/// A table that stands while the motor turns (a coupling has slipped) is no pitch of a screw: no file may hold that scale.
+#[test]
+fn what_no_machine_file_may_hold_is_not_named() {
+    let mut r = recording(|_, _, v, _| 0.1 * v.signum());
+    r.columns.push(Column::new("x.table_position_mm", vec![100.0; 30_000]));
+    let d = judged(&r);
+    assert_eq!((d.verdict, d.findings.len()), (Verdict::UnknownCause, 0), "{d:?}");
+    let mut machine = Machine::parse(MACHINE).unwrap();
+    machine.axes[0] = d.extended;
+    Machine::parse(&machine.to_json().to_string()).unwrap();
+}
+
 fn data(path: &str) -> Option<PathBuf> {
     let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
     let root = std::env::var_os("GIB_DATA").map_or_else(beside, PathBuf::from);

@@ -331,7 +331,7 @@ impl Fit {
     /// The effects that the parts stand for; none for a part beyond its physical bounds.
     pub fn effects(&self, frame: &Frame) -> impl Iterator<Item = Effect> {
         let pairs = self.parts.iter().zip(&self.coefficients);
-        pairs.filter_map(|(part, c)| (part.law.effect)(frame, &part.shape, c))
+        pairs.filter_map(|(part, c)| part.law.effect(frame, &part.shape, c))
     }
 
     /// Which part simulates the table behind a spring or a clearance; there is one at most.

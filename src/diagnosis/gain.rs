@@ -218,7 +218,7 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
 fn fitted_without(axis: &Axis, bench: &Bench, fit: &Fit, half: usize) -> Axis {
     let coefficients = bench.coefficients_without(fit, |block| half_of(block) == half);
     let effect = |(i, part): (usize, &super::fit::Part)| {
-        let of = |c: &[f64]| (part.law.effect)(bench.frame, &part.shape, c);
+        let of = |c: &[f64]| part.law.effect(bench.frame, &part.shape, c);
         of(&coefficients[i]).or_else(|| of(&fit.coefficients[i]))
     };
     let effects = fit.parts.iter().enumerate().filter_map(effect).collect();

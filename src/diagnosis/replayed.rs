@@ -186,8 +186,7 @@ impl Numbers {
     /// The machine that has them; `None` where one is beyond its physical bounds that was not.
     fn machine(&self, axis: &Axis, bench: &Bench, fit: &Fit) -> Option<Axis> {
         let parts = fit.parts.iter().zip(self.shapes.iter().zip(&self.coefficients));
-        let effect =
-            |(part, (shape, c)): (&fit::Part, (&Vec<f64>, &Vec<f64>))| (part.law.effect)(bench.frame, shape, c);
+        let effect = |(part, (shape, c)): (&fit::Part, (&Vec<f64>, &Vec<f64>))| part.law.effect(bench.frame, shape, c);
         let found: Vec<_> = parts.filter_map(effect).collect();
         let all = found.len() == fit.effects(bench.frame).count();
         all.then(|| belief::with_found(axis, bench.frame.axis, found))

@@ -389,7 +389,7 @@ pub fn is_physical(bench: &Bench, fit: &Fit) -> bool {
 #[must_use]
 pub fn is_within_bounds(bench: &Bench, fit: &Fit, part: usize) -> bool {
     let Part { law, shape, .. } = &fit.parts[part];
-    (law.effect)(bench.frame, shape, &fit.coefficients[part]).is_some()
+    law.effect(bench.frame, shape, &fit.coefficients[part]).is_some()
 }
 
 /// Whether a part is a ripple of few periods along the stroke.

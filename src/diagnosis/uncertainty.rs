@@ -143,7 +143,7 @@ pub fn effects(bench: &Bench, fit: &Fit, sure: Option<&Sure>) -> Vec<Option<(Eff
         .iter()
         .enumerate()
         .map(|(i, part)| {
-            let effect_of = |shape: &[f64], c: &[f64]| (part.law.effect)(bench.frame, shape, c);
+            let effect_of = |shape: &[f64], c: &[f64]| part.law.effect(bench.frame, shape, c);
             let effect = effect_of(&part.shape, &fit.coefficients[i])?;
             let values = effect.values();
             // Derivatives of the file's parameters by each unknown of this part.
@@ -225,7 +225,7 @@ pub fn widen(bench: &Bench, effects: &mut [Option<(Effect, Vec<f64>)>], alike: &
         let values = effect.values();
         let others: Vec<Vec<f64>> = (alike.iter().filter_map(|fit| {
             let part = fit.parts.get(i)?;
-            Some((part.law.effect)(bench.frame, &part.shape, &fit.coefficients[i])?.values())
+            Some(part.law.effect(bench.frame, &part.shape, &fit.coefficients[i])?.values())
         }))
         .collect();
         for (k, deviation) in deviations.iter_mut().enumerate() {

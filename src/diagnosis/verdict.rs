@@ -438,7 +438,7 @@ fn findings(axis: &Axis, bench: &Bench, selection: &Selection, sure: Option<&Sur
 /// What is to be said of parts whose parameters no machine has: others were found beside them, and would not have been without.
 fn nameless(frame: &Frame, fit: &Fit) -> Option<String> {
     let pairs = fit.parts.iter().zip(&fit.coefficients);
-    let beyond = pairs.filter(|(part, c)| (part.law.effect)(frame, &part.shape, c).is_none());
+    let beyond = pairs.filter(|(part, c)| part.law.effect(frame, &part.shape, c).is_none());
     let causes: Vec<&str> = beyond.map(|(part, _)| part.law.cause.name()).collect();
     (!causes.is_empty()).then(|| {
         format!(

@@ -288,6 +288,12 @@ impl Effect {
     pub fn keyed_values(&self, linear: bool) -> impl Iterator<Item = (&'static str, f64)> {
         self.cause().row().parameters.iter().map(move |p| p.key_for(linear)).zip(self.values())
     }
+
+    /// Whether a machine file may hold it: every value is a number within the range of its key.
+    #[must_use]
+    pub fn is_allowed(&self) -> bool {
+        self.cause().row().parameters.iter().zip(self.values()).all(|(p, value)| (p.low..=p.high).contains(&value))
+    }
 }
 
 #[cfg(test)]
@@ -350,5 +356,12 @@ mod tests {
             spot,
             Effect::PositionDependentFriction { centre_mm: 1.0, peak: 2.0, width_mm: 20.0, steepness: 2.0 }
         );
+    }
+
+    #[test]
+    fn what_a_file_may_hold_ends_at_the_range_of_each_key() {
+        for (scale_um_m, allowed) in [(1e5, true), (-1e5, true), (-1.1e5, false), (f64::NAN, false)] {
+            assert_eq!(Effect::ScrewPitchError { scale_um_m }.is_allowed(), allowed, "{scale_um_m}");
+        }
     }
 }

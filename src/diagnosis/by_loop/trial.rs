@@ -105,7 +105,7 @@ impl Trial {
     /// The effect that it stands for; `None` beyond physical bounds.
     #[must_use]
     pub fn effect(&self, frame: &Frame) -> Option<Effect> {
-        (self.law.effect)(frame, &self.shape, &self.coefficients)
+        self.law.effect(frame, &self.shape, &self.coefficients)
     }
 
     /// An axis with it.

@@ -151,8 +151,8 @@ pub struct Law {
     pub manner: Manner,
     /// The traces at given non-linear parameters.
     pub terms: Terms,
-    /// The effect that parameters and coefficients stand for; `None` beyond physical bounds.
-    pub effect: fn(&Frame, &[f64], &[f64]) -> Option<Effect>,
+    /// The effect that parameters and coefficients stand for; `None` beyond physical bounds. Asked by [`Law::effect`].
+    effect: fn(&Frame, &[f64], &[f64]) -> Option<Effect>,
     /// What leaves a similar trace.
     pub confused_with: &'static [Cause],
     /// What it says to a machinist.
@@ -179,6 +179,12 @@ impl Law {
             Terms::ByRows(terms) => resistances.iter().flat_map(|_| terms(frame, &[shape.to_vec()])).collect(),
             Terms::Simulated(effect) => table_side::terms_under_each(frame, resistances, effect(frame, shape)),
         }
+    }
+
+    /// The effect that parameters and coefficients stand for; `None` beyond physical bounds, or where no machine file may hold it.
+    #[must_use]
+    pub fn effect(&self, frame: &Frame, shape: &[f64], coefficients: &[f64]) -> Option<Effect> {
+        (self.effect)(frame, shape, coefficients).filter(Effect::is_allowed)
     }
 
     /// Whether the traces are a simulation of what happens between the rows.

@@ -101,7 +101,7 @@ impl Bench<'_, '_> {
         let all = [self.frame.belief.coulomb, 0.0];
         let effect = |(part, c): (&Part, &Vec<f64>)| {
             let c = if part.law.cause == Cause::PreslidingFriction { &all[..] } else { c };
-            (part.law.effect)(self.frame, &part.shape, c)
+            part.law.effect(self.frame, &part.shape, c)
         };
         let effects = parts.iter().zip(coefficients).filter(|(part, _)| !part.law.is_simulated()).filter_map(effect);
         let found: Vec<Effect> = effects.filter(Resistance::has).collect();
