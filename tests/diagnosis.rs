@@ -263,12 +263,13 @@ fn rows_that_are_not_used_are_told() {
 fn a_law_without_a_name_is_not_imitated_by_several_that_have_one() {
     /// Torque of time, position, speed and acceleration.
     type Extra = fn(f64, f64, f64, f64) -> f64;
-    let laws: [(&str, Extra); 5] = [
+    let laws: [(&str, Extra); 6] = [
         ("cube of speed", |_, _, v, _| 0.15 * (v / 60.0).powi(3)),
         ("step along the stroke", |_, x, _, _| if x > 104.0 { 0.1 } else { -0.1 }),
         ("grows with acceleration", |_, _, v, a| 0.2 * v.signum() * (a / 150.0).abs()),
-        ("drag that changes along the stroke", |_, x, v, _| 0.15 * (v / 60.0) * (x - 100.0) / 60.0),
-        ("harder at one time", |t, _, v, a| 0.004 * t * (0.0019 * a + 0.005 * v + 0.9 * v.signum() + 0.1)),
+        ("drag that changes evenly along the stroke", |_, x, v, _| 0.15 * (v / 60.0) * (x - 100.0) / 60.0),
+        ("friction that is another from one moment on", |t, _, v, _| if t > 17.0 { 0.2 * v.signum() } else { 0.0 }),
+        ("push changes evenly in time", |t, _, v, a| 0.004 * t * (0.0019 * a + 0.005 * v + 0.9 * v.signum() + 0.1)),
     ];
     for (goes, law) in laws {
         let d = judged(&recording(law));
@@ -321,6 +322,20 @@ fn what_the_hold_out_contradicts_is_not_named() {
     assert_eq!((d.verdict, d.findings.len(), d.extended), (Verdict::UnknownCause, 0, axis()));
     let said = |note: &String| note.contains("coulomb_friction_mismatch") && note.contains("hold-out");
     assert!(d.notes.iter().any(said), "{:?}", d.notes);
+}
+
+#[test]
+fn what_acts_on_the_hold_out_alone_is_unknown_there() {
+    let clean = recording(|_, _, _, _| 0.0);
+    let excerpt = |recording: &Recording| Excerpt::of(recording, &axis());
+    let with = |friction: f64| {
+        let holdout = recording(|_, _, v, _| friction * v.signum());
+        diagnose(&axis(), &excerpt(&clean), Some(&excerpt(&holdout)), &|_, _| true).unwrap()
+    };
+    assert_eq!(with(0.0).verdict, Verdict::NoDiscrepancy);
+    let d = with(0.3);
+    assert_eq!((d.verdict, d.findings.len()), (Verdict::UnknownCause, 0));
+    assert!(d.notes.iter().any(|note| note.contains("diagnose the hold-out by itself")), "{:?}", d.notes);
 }
 
 #[test]

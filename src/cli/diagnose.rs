@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use gib::diagnosis::gain::Gain;
 use gib::diagnosis::{Diagnosis, Excerpt, Left, Verdict, axis_of, diagnose};
 use gib::recording::Recording;
 
@@ -132,9 +133,9 @@ fn text(d: &Diagnosis) -> String {
         let _ = writeln!(text, "   {}", finding.evidence);
         let parameters: Vec<String> = finding
             .parameters(d.extended.drive.is_linear())
-            .map(|(key, value, std)| format!("{key} {}", with_interval(value, 1.96 * std)))
+            .map(|(key, value, std)| format!("{key} {}", with_interval(value, 2.0 * std)))
             .collect();
-        let _ = writeln!(text, "   {}", parameters.join(", "));
+        let _ = writeln!(text, "   {} (k = 2)", parameters.join(", "));
         for other in &finding.indistinguishable_from {
             let _ = writeln!(text, "   this recording cannot tell it from {other}");
         }
@@ -150,14 +151,12 @@ fn text(d: &Diagnosis) -> String {
         let (before, after) = (factor * gain.before, factor * gain.after);
         let _ = writeln!(
             text,
-            "{} error{} on rows not fitted: {} → {} {unit} RMS, {:.2} times better (95 %: {:.2} to {:.2})",
+            "{} error{} on rows not fitted: {} → {} {unit} RMS, {}",
             gain.channel,
             if gain.channel.ends_with("position") { "" } else { " while moving," },
             beside(before, after),
             beside(after, before),
-            gain.before / gain.after.max(1e-300),
-            gain.ci95[0],
-            gain.ci95[1]
+            times_better(gain)
         );
     }
     if d.verdict != Verdict::InsufficientData {
@@ -185,6 +184,21 @@ fn with_interval(value: f64, half: f64) -> String {
     let places = if half > 0.0 && half.is_finite() { decimals(half, 2) } else { decimals(value, 5) };
     format!("{value:.places$} ± {half:.places$}")
 }
+
+/// How much better a machine is than the belief, where it is another one, as far as that is a number that says something.
+fn times_better(gain: &Gain) -> String {
+    let ratio = gain.before / gain.after.max(1e-300);
+    if gain.before == gain.after {
+        "no change".to_owned()
+    } else if ratio >= MOST_TIMES {
+        format!("more than {MOST_TIMES} times better")
+    } else {
+        format!("{ratio:.2} times better (95 %: {:.2} to {:.2})", gain.ci95[0], gain.ci95[1].min(MOST_TIMES))
+    }
+}
+
+/// Gain from which on only that it is more is said.
+const MOST_TIMES: f64 = 1000.0;
 
 /// A value to as many decimals as three digits of it or of its neighbour take, whichever has more.
 fn beside(value: f64, neighbour: f64) -> String {

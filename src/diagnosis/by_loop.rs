@@ -17,7 +17,8 @@ use super::excerpt::Excerpt;
 use super::experiment;
 use super::fit::Bench;
 use super::frame::{Columns, Frame};
-use super::gain::{self, Holdout};
+use super::gain;
+use super::holdout::Holdout;
 use super::judge::{Excess, LITTLE_LEFT, TOLERABLE_EXCESS, refuted, rms, shows};
 use super::known::Known;
 use super::progress::{Stopped, Watch};
@@ -87,7 +88,7 @@ pub fn completed(
     let elsewhere = holdout.and_then(|holdout| Holdout::new(axis, holdout.columns.as_ref().ok()?));
     let gains = match elsewhere {
         Some(rows) => {
-            let [gains, in_judged_rows] = gain::on_holdout(axis, &extended, &rows, watch)?;
+            let [gains, in_judged_rows] = rows.gains(axis, &extended, watch)?;
             if shows(&in_judged_rows) && refuted(&in_judged_rows, &extended.effects) {
                 return Ok(found);
             }
@@ -224,13 +225,7 @@ fn strength(gained: &[f64]) -> f64 {
 
 /// Whether the torque gainsays a machine with a cause more: it then is off by more than noise, and by more than before.
 fn is_gainsaid(frame: &Frame, before: &Axis, with: &Axis) -> bool {
-    let excess = |axis: &Axis| {
-        let base = belief::base_alone(axis);
-        let frame = frame.believing(&base);
-        let bench = Bench::new(&frame, &Known::of(axis, &frame));
-        let left = bench.fit(Vec::new());
-        Excess::of(&bench, &left, &left).largest()
-    };
+    let excess = |axis| Excess::of_machine(axis, frame).largest();
     let after = excess(with);
     after > LITTLE_LEFT && (after > TOLERABLE_EXCESS || after > excess(before))
 }

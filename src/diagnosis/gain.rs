@@ -45,7 +45,8 @@ pub struct Replay {
     pub error: Vec<f64>,
 }
 
-fn errors(axis: &Axis, observed: &Observed, servo: &ByServo) -> Option<Errors> {
+/// The errors of a machine on a recording; `None` where nothing can be predicted.
+pub(super) fn errors(axis: &Axis, observed: &Observed, servo: &ByServo) -> Option<Errors> {
     let prediction = predict_by(axis, observed, servo).ok()?;
     let less =
         |measured: &[f64], model: &[f64]| -> Vec<f64> { measured.iter().zip(model).map(|(m, p)| m - p).collect() };
@@ -69,20 +70,6 @@ fn torque_errors(observed: &Observed, prediction: &TorquePrediction) -> Vec<f64>
     rows.map(|((measured, predicted), v)| if v.abs() > standing { measured - predicted } else { f64::NAN }).collect()
 }
 
-/// The gains on a recording that was not fitted, and those by which a law may be refuted ([`in_judged_rows`]).
-///
-/// # Errors
-/// [`Stopped`] when the watch's caller said so.
-pub fn on_holdout(axis: &Axis, extended: &Axis, holdout: &Holdout, watch: &Watch) -> Result<[Vec<Gain>; 2], Stopped> {
-    let Holdout { observed, weight } = holdout;
-    let servo = ByServo::of(axis, observed);
-    let both =
-        watch.each(&[axis, extended], (0.92, 0.99), "measuring the gain", |axis| errors(axis, observed, &servo))?;
-    let [Some(before), Some(after)] = both.as_slice() else { return Ok([Vec::new(), Vec::new()]) };
-    let judged = |errors| in_judged_rows(errors, weight);
-    Ok([gains(axis, before, after, Over::All), gains(axis, &judged(before), &judged(after), Over::Most)])
-}
-
 /// The gains of the second machine over the first in some of a recording's rows.
 ///
 /// # Errors
@@ -101,22 +88,11 @@ pub fn where_judged(
     Ok(gains(machines[0], before, after, Over::All))
 }
 
-/// Another recording, on which nothing is fitted.
-pub struct Holdout {
-    observed: Observed,
-    /// What each row's torque says of a law, see [`weight_of_rows`].
-    weight: Vec<f64>,
-}
-
-impl Holdout {
-    /// Of every row; `None` where no stretch is long enough for a motion.
-    #[must_use]
-    pub fn new(axis: &Axis, columns: &Columns) -> Option<Self> {
-        let (observed, base) = (columns.observed()?, belief::base_alone(axis));
-        let thinned = columns.clone().thinned();
-        let weight = weight_of_rows(&Frame::new(&base, &thinned, None), &observed.time_s);
-        Some(Self { observed, weight })
-    }
+/// The gains of one machine over another on a recording by their errors, and those by which a law may be refuted
+/// ([`in_judged_rows`]).
+pub(super) fn of_both(axis: &Axis, [before, after]: [&Errors; 2], weight: &[f64]) -> [Vec<Gain>; 2] {
+    let [b, a] = [before, after].map(|errors| in_judged_rows(errors, weight));
+    [gains(axis, before, after, Over::All), gains(axis, &b, &a, Over::Most)]
 }
 
 /// Errors by which a law may be refuted: of the torque only in judged rows and as they count there. Where the axis sticks or
@@ -252,7 +228,7 @@ fn half_of_rows(bench: &Bench, time_s: &[f64]) -> Vec<usize> {
 }
 
 /// For each row the lesser weight of the two judged rows about it; NaN where rows between them are not judged.
-fn weight_of_rows(frame: &Frame, time_s: &[f64]) -> Vec<f64> {
+pub(super) fn weight_of_rows(frame: &Frame, time_s: &[f64]) -> Vec<f64> {
     let stride = frame.kept.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap_or(1);
     let mut after = 0;
     let of = |&t: &f64| {

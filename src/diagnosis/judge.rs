@@ -6,11 +6,13 @@
 //! that were held out worse than the belief: laws that lean on each other, or on the noise of the encoder that they are
 //! driven by, may explain what was measured and yet make a wrong machine.
 
+use super::belief;
 use super::contact;
 use super::fit::{Bench, Fit};
 use super::foreign;
-use super::frame::Columns;
+use super::frame::{Columns, Frame};
 use super::gain::{self, Errors, Gain, HeldOut, Replay};
+use super::known::Known;
 use super::progress::{Stopped, Watch};
 use super::select::Selection;
 use super::show::{self, Coordinate};
@@ -23,7 +25,7 @@ use crate::plant::physics::LEAST_SLOPE;
 pub const TOLERABLE_EXCESS: f64 = 0.6;
 /// The same of what is tied to no coordinate: noise of a current that was filtered over some rows is up to twice what second
 /// differences see of it, and what no move calls up is no machine's doing before that.
-const TOLERABLE_IF_UNTIED: f64 = 3.0;
+pub const TOLERABLE_IF_UNTIED: f64 = 3.0;
 /// Share of the excess that named causes must remove together.
 const LEAST_EXPLAINED: f64 = 0.8;
 /// The same where they leave little, and nothing of the curve that they follow: the floor does not see all that an encoder's grid makes.
@@ -322,6 +324,16 @@ impl Excess {
             .map(|c| (rms[c] / bench.frame.floor(&floor[c], c == 0)).powi(2) - 1.0)
             .collect();
         Excess { channels }
+    }
+
+    /// What a machine leaves on a system of equations.
+    #[must_use]
+    pub fn of_machine(axis: &Axis, frame: &Frame) -> Excess {
+        let base = belief::base_alone(axis);
+        let frame = frame.believing(&base);
+        let bench = Bench::new(&frame, &Known::of(axis, &frame));
+        let left = bench.fit(Vec::new());
+        Excess::of(&bench, &left, &left)
     }
 
     /// Of the worse channel.

@@ -27,6 +27,7 @@ mod formulation;
 pub mod frame;
 pub mod gain;
 mod grids;
+mod holdout;
 mod json;
 mod judge;
 mod known;

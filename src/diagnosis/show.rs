@@ -25,6 +25,17 @@ pub struct View {
     pub curve: Vec<(f64, f64, f64)>,
 }
 
+impl View {
+    /// Its coordinate, and of frequency the strongest line of what is left.
+    fn strongest_at(&self) -> String {
+        let strongest = self.curve.iter().max_by(|a, b| a.2.total_cmp(&b.2));
+        match (self.coordinate, strongest) {
+            (Coordinate::Frequency, Some((hertz, ..))) => format!("frequency, at {hertz:.3} Hz"),
+            (coordinate, _) => coordinate.name().to_owned(),
+        }
+    }
+}
+
 /// Share of its variance from which a residual is said to go with a coordinate.
 const TIED: f64 = 0.05;
 /// Variance above the noise floor, in units of the floor's, from which on it is said where a residual lives.
@@ -166,7 +177,7 @@ pub fn describe(views: &[View], above: f64, excess: f64) -> String {
     let strong: Vec<String> = list
         .iter()
         .take(3)
-        .map(|view| format!("{} ({:.0} % of its variance)", view.coordinate.name(), 100.0 * view.after))
+        .map(|view| format!("{} ({:.0} % of its variance)", view.strongest_at(), 100.0 * view.after))
         .collect();
     match (excess > LITTLE, strong.is_empty()) {
         (false, _) if above > LITTLE => "no more than what is believed may be off by".to_owned(),

@@ -10,7 +10,8 @@ use super::excerpt::Excerpt;
 use super::experiment;
 use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
-use super::gain::{self, Gain, Holdout, Replay};
+use super::gain::{Gain, Replay};
+use super::holdout::Holdout;
 use super::judge::{Excess, Judge, Judged, refutation, refuted, rms, shows};
 use super::known::Known;
 use super::narrow::{self, Band};
@@ -275,7 +276,7 @@ fn answer_on(
         match holdout.columns.as_ref().map(|columns| Holdout::new(axis, columns)) {
             Ok(Some(rows)) => {
                 notes.extend(holdout.notes.iter().map(|note| format!("hold-out: {note}")));
-                let [gains, in_judged_rows] = gain::on_holdout(axis, &extended, &rows, watch)?;
+                let [gains, in_judged_rows] = rows.gains(axis, &extended, watch)?;
                 judged.gains = gains;
                 let effects: Vec<Effect> = findings.iter().map(|f| f.effect).collect();
                 if shows(&in_judged_rows) && refuted(&in_judged_rows, &effects) {
@@ -283,7 +284,12 @@ fn answer_on(
                     notes.push(refutation(causes, &in_judged_rows, "the hold-out"));
                     judged = judge.nothing(&judged.selection);
                     (findings, extended) = (Vec::new(), axis.clone());
-                    [judged.gains, _] = gain::on_holdout(axis, axis, &rows, watch)?;
+                    [judged.gains, _] = rows.gains(axis, axis, watch)?;
+                } else if !shows(&in_judged_rows) {
+                    if let Some((verdict, note)) = rows.beside_more(judged.verdict, &extended) {
+                        judged.verdict = verdict;
+                        notes.push(note);
+                    }
                 }
             }
             why => {

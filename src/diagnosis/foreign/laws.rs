@@ -29,7 +29,7 @@ impl Foreign {
     }
 }
 
-pub static LAWS: [Foreign; 26] = [
+pub static LAWS: [Foreign; 37] = [
     Foreign {
         goes: "with the cube of speed",
         numbers: 1,
@@ -152,6 +152,72 @@ pub static LAWS: [Foreign; 26] = [
         regressors: |frame, share| on_either_side(frame, share, |_| 1.0),
     },
     Foreign {
+        goes: "as a torque that is another from one moment on",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| vec![from_moment(frame, share, |_| 1.0)],
+    },
+    Foreign {
+        goes: "as a friction that is another from one moment on",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| vec![from_moment(frame, share, |i| frame.direction[i])],
+    },
+    Foreign {
+        goes: "as a drag that is another from one moment on",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| vec![from_moment(frame, share, |i| frame.v[i])],
+    },
+    Foreign {
+        goes: "as an inertia that is another from one moment on",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| vec![from_moment(frame, share, |i| frame.a[i])],
+    },
+    Foreign {
+        goes: "as a motor that pushes harder or less from one moment on",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| vec![from_moment(frame, share, |i| load(frame, i))],
+    },
+    Foreign {
+        goes: "as a torque that changes evenly in time",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| evenly(frame, share, |i| frame.seconds(i), |_| 1.0),
+    },
+    Foreign {
+        goes: "as a drag that changes evenly in time",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| evenly(frame, share, |i| frame.seconds(i), |i| frame.v[i]),
+    },
+    Foreign {
+        goes: "as an inertia that changes evenly in time",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| evenly(frame, share, |i| frame.seconds(i), |i| frame.a[i]),
+    },
+    Foreign {
+        goes: "as a motor whose push changes evenly in time",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| evenly(frame, share, |i| frame.seconds(i), |i| load(frame, i)),
+    },
+    Foreign {
+        goes: "as an inertia that changes evenly along the stroke",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| evenly(frame, share, |i| frame.x[i], |i| frame.a[i]),
+    },
+    Foreign {
+        goes: "as a drag that changes evenly along the stroke",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| evenly(frame, share, |i| frame.x[i], |i| frame.v[i]),
+    },
+    Foreign {
         goes: "as a torque that wanders in time",
         numbers: LEVELS,
         somewhere: false,
@@ -246,10 +312,33 @@ fn on_either_side(frame: &Frame, share: f64, of: impl Fn(usize) -> f64) -> Vec<V
     [false, true].map(|beyond| frame.judged_by(|i| if (frame.x[i] > place) == beyond { of(i) } else { 0.0 })).into()
 }
 
+/// What a function of the row is from one moment on.
+fn from_moment(frame: &Frame, share: f64, of: impl Fn(usize) -> f64) -> Vec<f64> {
+    let moment = between(frame, share, |i| frame.seconds(i));
+    frame.judged_by(|i| if frame.seconds(i) > moment { of(i) } else { 0.0 })
+}
+
+/// What a function of the row is by how far along a coordinate it lies from where all is as believed.
+fn evenly(frame: &Frame, share: f64, along: impl Fn(usize) -> f64, of: impl Fn(usize) -> f64) -> Vec<Vec<f64>> {
+    let as_believed = between(frame, share, &along);
+    vec![frame.judged_by(|i| (along(i) - as_believed) * of(i))]
+}
+
+/// A share of the way along a coordinate over the judged rows.
+fn between(frame: &Frame, share: f64, along: impl Fn(usize) -> f64) -> f64 {
+    let (low, high) = judged_range(frame, along);
+    low + share * (high - low)
+}
+
+/// The least and the greatest of a coordinate over the judged rows.
+fn judged_range(frame: &Frame, along: impl Fn(usize) -> f64) -> (f64, f64) {
+    let judged = frame.kept.iter().map(|&i| along(i));
+    judged.fold((f64::MAX, f64::MIN), |(low, high), a| (a.min(low), a.max(high)))
+}
+
 /// What a function of the row is at each level along a coordinate; between two levels it belongs to both.
 fn any_form(frame: &Frame, along: impl Fn(usize) -> f64, of: impl Fn(usize) -> f64) -> Vec<Vec<f64>> {
-    let judged = frame.kept.iter().map(|&i| along(i));
-    let (low, high) = judged.fold((f64::MAX, f64::MIN), |(low, high), a| (a.min(low), a.max(high)));
+    let (low, high) = judged_range(frame, &along);
     let per = (LEVELS - 1) as f64 / (high - low).max(1e-300);
     let rows = 0..frame.x.len();
     let at = |i: usize| ((along(i) - low) * per).clamp(0.0, (LEVELS - 1) as f64);

@@ -1,0 +1,65 @@
+//! A recording on which nothing is fitted: what an answer is worth there, and what it leaves.
+
+use super::belief;
+use super::frame::{Columns, Frame};
+use super::gain::{Gain, errors, of_both, weight_of_rows};
+use super::judge::{Excess, TOLERABLE_IF_UNTIED};
+use super::progress::{Stopped, Watch};
+use super::verdict::Verdict;
+use crate::machine::Axis;
+use crate::plant::added::ByServo;
+use crate::plant::observed::Observed;
+
+/// Another recording than the one that is diagnosed.
+pub struct Holdout {
+    observed: Observed,
+    /// The rows of the balance.
+    thinned: Columns,
+    /// What each row's torque says of a law, see [`weight_of_rows`].
+    weight: Vec<f64>,
+}
+
+impl Holdout {
+    /// Of every row; `None` where no stretch is long enough for a motion.
+    #[must_use]
+    pub fn new(axis: &Axis, columns: &Columns) -> Option<Self> {
+        let (observed, base) = (columns.observed()?, belief::base_alone(axis));
+        let thinned = columns.clone().thinned();
+        let weight = weight_of_rows(&Frame::new(&base, &thinned, None), &observed.time_s);
+        Some(Self { observed, thinned, weight })
+    }
+
+    /// The gains of an extended axis over another, and those by which a law may be refuted.
+    ///
+    /// # Errors
+    /// [`Stopped`] when the watch's caller said so.
+    pub fn gains(&self, axis: &Axis, extended: &Axis, watch: &Watch) -> Result<[Vec<Gain>; 2], Stopped> {
+        let servo = ByServo::of(axis, &self.observed);
+        let errors = |axis: &&Axis| errors(axis, &self.observed, &servo);
+        let both = watch.each(&[axis, extended], (0.92, 0.99), "measuring the gain", errors)?;
+        let [Some(before), Some(after)] = both.as_slice() else { return Ok([Vec::new(), Vec::new()]) };
+        Ok(of_both(axis, [before, after], &self.weight))
+    }
+
+    /// An answer beside what its machine leaves here, and a note of it, where that is far above the noise. It is meant for a machine
+    /// that takes nothing off what the belief leaves: something then acts here that does not act in the recording.
+    #[must_use]
+    pub fn beside_more(&self, verdict: Verdict, extended: &Axis) -> Option<(Verdict, String)> {
+        let verdict = match verdict {
+            Verdict::NoDiscrepancy => Verdict::UnknownCause,
+            Verdict::Explained => Verdict::PartlyExplained,
+            _ => return None,
+        };
+        let base = belief::base_alone(extended);
+        let frame = Frame::new(&base, &self.thinned, None);
+        let masses = extended.two_masses().unwrap_or_default();
+        let beyond = Excess::of_machine(extended, &masses.iter().fold(frame, Frame::after_first_swings)).largest();
+        let note = || {
+            format!(
+                "the hold-out leaves {:.1} times its noise, and nothing that the recording shows explains it: something acts there that does not act here; diagnose the hold-out by itself, too",
+                (1.0 + beyond).sqrt()
+            )
+        };
+        (beyond > TOLERABLE_IF_UNTIED).then(|| (verdict, note()))
+    }
+}
