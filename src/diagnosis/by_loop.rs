@@ -27,11 +27,11 @@ use super::verdict::{Diagnosis, Finding, Verdict, confidence, unexplained};
 use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::added::ByServo;
-use replays::{BLOCKS, Over, Replays, floor_of, mean, misses};
+use replays::{BLOCKS, Over, Replays, floor_of, mean, mean_of_worse_half, misses};
 use trial::{Refined, Trial, starts};
 
-/// Misses from which on the loop has something to say: blocks are missed, in the geometric mean, by more than twice what the encoder
-/// itself is off by.
+/// Misses from which on the loop has something to say: half of the blocks are missed, in the geometric mean, by more than twice what the
+/// encoder itself is off by.
 const MUCH: f64 = 0.9;
 /// The miss of a block by no more than the encoder itself is off by.
 const NOTHING: f64 = 0.35;
@@ -73,7 +73,7 @@ pub fn completed(
     let silent = !open || axis.effects.iter().any(about) || doubtful.len() > 1;
     let Some(known) = found.replay.as_ref().filter(|_| !silent) else { return Ok(found) };
     let at_first = misses(&known.error, floor_of(&whole.position));
-    let much = mean(&at_first, GIVES).min(mean(&at_first, JUDGES)) >= MUCH;
+    let much = is_much(&at_first);
     let Some(observed) = much.then(|| whole.observed()).flatten() else { return Ok(found) };
     let stays = found.extended.effects.iter().filter(|effect| !doubtful.contains(&effect.cause())).copied();
     let without = found.extended.with_effects(stays.collect());
@@ -110,6 +110,11 @@ pub fn completed(
     Ok(Diagnosis { verdict: Verdict::Explained, findings, gains, unexplained, notes, extended, ..found })
 }
 
+/// Whether the loop has something to say.
+fn is_much(misses: &[f64]) -> bool {
+    mean_of_worse_half(misses, GIVES).min(mean_of_worse_half(misses, JUDGES)) >= MUCH
+}
+
 /// What the loop tells.
 struct Told {
     finding: Finding,
@@ -129,7 +134,7 @@ fn told(
 ) -> Result<Option<Told>, Stopped> {
     let Some(before) = replays.error(named) else { return Ok(None) };
     let misses = replays.misses(&before);
-    if mean(&misses, GIVES).min(mean(&misses, JUDGES)) < MUCH {
+    if !is_much(&misses) {
         return Ok(None);
     }
     let best = promising(axis, &replays.beginning(), frame, extended, watch)?;
@@ -295,6 +300,13 @@ mod tests {
         let told = told(&[hidden]);
         let [Effect::PreslidingFriction { displacement_um, .. }] = told.as_slice() else { panic!("{told:?}") };
         assert!((displacement_um / 4.0 - 1.0).abs() < 0.1, "{displacement_um}");
+    }
+
+    #[test]
+    fn a_loop_that_rests_most_of_the_time_is_asked_and_one_that_misses_in_moments_is_not() {
+        let missed =
+            |every: usize| (0..BLOCKS).map(|i| if i / 2 % every == 0 { 2.5 } else { NOTHING }).collect::<Vec<_>>();
+        assert!(is_much(&missed(3)) && !is_much(&missed(8)) && !is_much(&[NOTHING; BLOCKS]));
     }
 
     #[test]

@@ -41,15 +41,23 @@ fn is_fast(cause: Cause) -> bool {
     ABOUT_REVERSALS.contains(&cause) || cause == Cause::DeadTime
 }
 
+/// Whether something that is fast is believed.
+fn believes_fast(axis: &Axis) -> bool {
+    axis.effects.iter().any(|effect| is_fast(effect.cause()))
+}
+
 /// Whether a quieter look has found what the look before has not: causes that explain all where none fitted, or more of them than it
-/// had. What is fast it does not add: there it stands in for what the low-pass smears.
+/// had. What is fast it does not add: there it stands in for what the low-pass smears. Nor does it doubt a belief that has something fast:
+/// what a low-pass smears of that is no cause.
 #[must_use]
-pub fn finds_more(again: &Diagnosis, before: &Diagnosis) -> bool {
+pub fn finds_more(axis: &Axis, again: &Diagnosis, before: &Diagnosis) -> bool {
     let (found, known) = (causes(again), causes(before));
     let mut more = found.iter().filter(|cause| !known.contains(cause)).peekable();
     let slow = more.peek().is_some() && more.all(|cause| !is_fast(*cause));
+    let doubts = before.verdict == Verdict::NoDiscrepancy && believes_fast(axis);
     again.verdict == Verdict::Explained
         && is_sure(again)
+        && !doubts
         && (before.verdict == Verdict::UnknownCause || slow && known.iter().all(|cause| found.contains(cause)))
 }
 
@@ -57,14 +65,13 @@ pub fn finds_more(again: &Diagnosis, before: &Diagnosis) -> bool {
 /// fast as well, unless something of the kind is believed: what a low-pass smears of that looks like other numbers of it.
 #[must_use]
 pub fn agree(axis: &Axis, one: &Diagnosis, other: &Diagnosis) -> bool {
-    let believed = axis.effects.iter().any(|effect| is_fast(effect.cause()));
     let sorted = |diagnosis: &Diagnosis| {
         let mut list = causes(diagnosis);
         list.sort();
         list
     };
     let named = matches!(other.verdict, Verdict::Explained | Verdict::PartlyExplained);
-    !believed && one.verdict == Verdict::Explained && named && is_sure(one) && sorted(one) == sorted(other)
+    !believes_fast(axis) && one.verdict == Verdict::Explained && named && is_sure(one) && sorted(one) == sorted(other)
 }
 
 /// Whether a delay that is named is known to be one, with all that its interval holds: what a servo makes of the grid of its encoder, and

@@ -179,7 +179,7 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
             break;
         }
         let again = answer(&recorded, &wide, notes.clone())?;
-        if quiet::finds_more(&again, &found) {
+        if quiet::finds_more(axis, &again, &found) {
             found = again;
         } else if found.verdict == Verdict::NoDiscrepancy {
             match heard.take().filter(|before| quiet::agree(axis, before, &again)) {

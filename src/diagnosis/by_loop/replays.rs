@@ -123,6 +123,16 @@ pub fn mean(of_blocks: &[f64], over: Over) -> f64 {
     blocks().sum::<f64>() / blocks().count().max(1) as f64
 }
 
+/// The same over that half of them which is missed most: an axis that rests or goes on evenly is where it is told to be by any machine.
+#[must_use]
+pub fn mean_of_worse_half(of_blocks: &[f64], over: Over) -> f64 {
+    let blocks = of_blocks.iter().enumerate().filter(|(block, _)| over.has(*block));
+    let mut missed: Vec<f64> = blocks.map(|(_, value)| *value).collect();
+    missed.sort_by(|a, b| b.total_cmp(a));
+    missed.truncate(missed.len().div_ceil(2));
+    missed.iter().sum::<f64>() / missed.len().max(1) as f64
+}
+
 fn blocks_of(rows: usize) -> impl Iterator<Item = Range<usize>> {
     (0..BLOCKS).map(move |block| block * rows / BLOCKS..(block + 1) * rows / BLOCKS)
 }
