@@ -100,6 +100,19 @@ fn each_law_is_found_under_its_own_name() {
     );
 }
 
+/// Friction and load take 1.0 N·m one way and 0.8 the other.
+#[test]
+fn a_motor_that_is_not_linear_within_its_friction_is_found() {
+    let unit = TAU / 10.0;
+    for limit in [1.05, 0.95] {
+        let beyond = |_: f64, _: f64, v: f64, a: f64| {
+            let delivered = 0.003 * a * unit + 0.008 * v * unit + 0.9 * v.signum() + 0.1;
+            delivered.signum() * (delivered.abs() - limit).max(0.0) * (1.0 / 0.4 - 1.0)
+        };
+        finds(Cause::TorqueSaturation, &[limit, 0.4], 0.05, &recording(beyond));
+    }
+}
+
 #[test]
 fn a_drift_slower_than_the_recording_is_named_and_its_end_is_not_known() {
     for most in [0.2, 0.6] {

@@ -31,6 +31,7 @@ mod holdout;
 mod json;
 mod judge;
 mod known;
+mod low_limit;
 mod many;
 mod means;
 mod narrow;

@@ -14,6 +14,7 @@ use super::gain::{Gain, Replay};
 use super::holdout::Holdout;
 use super::judge::{Excess, Judge, Judged, refutation, refuted, rms, shows};
 use super::known::Known;
+use super::low_limit;
 use super::narrow::{self, Band};
 use super::progress::{Progress, Stopped, Watch, on_all_cores};
 use super::quiet;
@@ -264,6 +265,7 @@ fn answer_on(
             judged = again;
         }
     }
+    judged = low_limit::or_else(judged, (&judge, bench), &laws, watch)?;
     notes.extend(judged.refutation.take().or(judged.nearest.take()));
     let replayed = replayed::refined(bench, judge.held_out(), &judged, watch)?;
     let sure = replayed.map(|replayed| {

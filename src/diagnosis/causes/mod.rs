@@ -17,7 +17,7 @@ mod quadratic_drag;
 mod screw_periodic_error;
 mod screw_pitch_error;
 mod stribeck_friction;
-mod torque_saturation;
+pub mod torque_saturation;
 mod viscous_friction_mismatch;
 
 pub(super) mod periods;
