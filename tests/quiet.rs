@@ -6,7 +6,8 @@ mod board;
 #[path = "common/generated.rs"]
 mod generated;
 
-use generated::{Truth, rig, said};
+use board::outside::{Kind, Outside};
+use generated::{Rig, Truth, rig, said};
 
 /// Each is a thousandth of what the belief has, or of its friction: one look alone says that there is no discrepancy.
 #[test]
@@ -29,5 +30,18 @@ fn a_machine_as_believed_is_told_as_such_in_that_noise() {
     for seed in [11, 12] {
         let (verdict, findings) = said([&rig(), &rig()], seed, |_| ());
         assert_eq!((verdict.as_str(), findings.as_slice()), ("no_discrepancy", &[][..]), "seed {seed}");
+    }
+}
+
+/// A vibration that sweeps through all frequencies is tied to nothing, and smaller than the noise of the torque sensor: that it is no noise
+/// shows in that the axis follows it.
+#[test]
+fn what_is_tied_to_nothing_is_no_noise_where_the_axis_follows_it() {
+    let fine = Rig { encoder_step: 2e-4, torque_noise: 0.05, ..rig() };
+    for (seed, torque) in [(21, 0.06), (22, 0.09)] {
+        let kind = Kind::SweepingVibration { f0: 5.0, f1: 60.0, time: 30.0 };
+        let sweep = |truth: &mut Truth| truth.outside = Some(Outside { kind: kind.clone(), magnitude: torque });
+        let (verdict, findings) = said([&fine, &fine], seed, sweep);
+        assert_eq!((verdict.as_str(), findings.as_slice()), ("unknown_cause", &[][..]), "seed {seed}");
     }
 }

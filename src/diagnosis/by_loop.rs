@@ -21,13 +21,15 @@ use super::gain;
 use super::holdout::Holdout;
 use super::judge::{Excess, LITTLE_LEFT, TOLERABLE_EXCESS, refuted, rms, shows};
 use super::known::Known;
+use super::left::unexplained;
 use super::progress::{Stopped, Watch};
 use super::show;
-use super::verdict::{Diagnosis, Finding, Verdict, confidence, unexplained};
+use super::verdict::{Diagnosis, Finding, Verdict, confidence};
 use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::added::ByServo;
-use replays::{BLOCKS, Over, Replays, floor_of, mean, mean_of_worse_half, misses};
+pub use replays::floor_of;
+use replays::{BLOCKS, Over, Replays, mean, mean_of_worse_half, misses};
 use trial::{Refined, Trial, starts};
 
 /// Misses from which on the loop has something to say: half of the blocks are missed, in the geometric mean, by more than twice what the
@@ -239,7 +241,7 @@ fn is_gainsaid(frame: &Frame, before: &Axis, with: &Axis) -> bool {
 mod tests {
     use super::*;
     use crate::diagnosis::gain::HeldOut;
-    use crate::diagnosis::verdict::{Left, Unexplained};
+    use crate::diagnosis::left::{Left, Unexplained};
     use crate::machine::Machine;
     use crate::plant::moves::{Moves, Reach};
     use crate::plant::simulate::{Sensors, Setup, simulate};
@@ -278,6 +280,7 @@ mod tests {
             missing: Vec::new(),
             notes: Vec::new(),
             extended: belief.clone(),
+            followed: false,
             replay: believed.unwrap().replay,
         };
         let answer = completed(&belief, (whole, None), &frame, silent, &watch).unwrap();

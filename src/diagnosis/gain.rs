@@ -159,6 +159,13 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
         Ok(Some(Errors { channels, replay: even.replay.clone() }))
     }
 
+    /// Times of all rows, measured less replayed position of a loop by its errors, and the measured one; `None` where none was replayed.
+    #[must_use]
+    pub fn misses<'e>(&'e self, errors: &'e Errors) -> Option<[&'e [f64]; 3]> {
+        let (observed, _) = self.observed.as_ref()?;
+        Some([&observed.time_s, errors.channels[1].as_ref()?, &observed.position])
+    }
+
     /// RMS of the torque while the axis moves, by a machine with this set of causes.
     #[must_use]
     pub fn torque_error(&self, fit: &Fit) -> Option<f64> {

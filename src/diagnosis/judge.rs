@@ -9,6 +9,7 @@
 use super::belief;
 use super::contact;
 use super::fit::{Bench, Fit};
+use super::followed::is_followed;
 use super::foreign;
 use super::frame::{Columns, Frame};
 use super::gain::{self, Errors, Gain, HeldOut, Replay};
@@ -48,6 +49,9 @@ pub const MOST_OF_A_CURVE: f64 = 0.03;
 /// a cause must take 4 % off the amplitude of what is left; a row as it was measured holds more noise.
 const LEAST_RATIO: f64 = 1.02;
 
+/// What is said of such a rest.
+const FOLLOWED: &str = "what is left of the torque goes with no coordinate, and is no noise of its sensor: the axis follows it, and the closed loop misses the measured position by what it does";
+
 /// What stays the same while sets of causes are judged.
 pub struct Judge<'j, 'f, 'a> {
     bench: &'j Bench<'f, 'a>,
@@ -73,6 +77,8 @@ pub struct Judged {
     pub refutation: Option<String>,
     /// What explains some of it, where nothing explains enough.
     pub nearest: Option<String>,
+    /// Whether the axis follows what is not explained, see [`is_followed`].
+    pub followed: bool,
 }
 
 impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
@@ -129,7 +135,15 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let Weighed { gains, in_judged_rows, fails } = weighed;
         if !fails {
             let replay = errors.and_then(|errors| errors.replay);
-            return Ok(Judged { verdict, selection: found, gains, replay, refutation: None, nearest: None });
+            return Ok(Judged {
+                verdict,
+                selection: found,
+                gains,
+                replay,
+                refutation: None,
+                nearest: None,
+                followed: false,
+            });
         }
         let causes = found.fit.parts.iter().map(|p| p.law.cause);
         let refutation = refutation(causes, &in_judged_rows, "rows that it was not fitted to");
@@ -162,15 +176,25 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     #[must_use]
     pub fn nothing(&self, found: &Selection) -> Judged {
         let before = Excess::of(self.bench, &self.empty, &found.fit);
-        let unknown = before.largest() > TOLERABLE_EXCESS && !self.may_be_noise(&self.empty, &before);
+        let above = before.largest() > TOLERABLE_EXCESS;
+        let untied = self.may_be_noise(&self.empty, &before);
+        let followed = above && self.is_followed();
+        let unknown = above && (followed || !untied);
         Judged {
             verdict: if unknown { Verdict::UnknownCause } else { Verdict::NoDiscrepancy },
             selection: Selection { fit: self.empty.clone(), rivals: Vec::new(), alike: Vec::new() },
             gains: self.held_out.gains(self.believed.as_ref(), self.believed.as_ref()),
             replay: self.believed.as_ref().and_then(|errors| errors.replay.clone()),
             refutation: None,
-            nearest: None,
+            nearest: (followed && untied).then(|| FOLLOWED.to_owned()),
+            followed,
         }
+    }
+
+    /// Whether the axis follows what the belief leaves of the torque.
+    fn is_followed(&self) -> bool {
+        let misses = self.believed.as_ref().and_then(|errors| self.held_out.misses(errors));
+        misses.is_some_and(|[time_s, error, position]| is_followed(self.bench, &self.empty, time_s, error, position))
     }
 
     /// The same where they do not explain enough: that is said of an unknown cause.
@@ -179,7 +203,8 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let after = Excess::of(self.bench, &found.fit, &found.fit);
         let share = Excess::of(self.bench, &self.empty, &found.fit).explained_by(&after);
         let says = nothing.verdict == Verdict::UnknownCause && !found.fit.parts.is_empty();
-        Judged { nearest: says.then(|| too_little(&found.fit, share)), ..nothing }
+        let nearest = says.then(|| too_little(&found.fit, share)).or(nothing.nearest);
+        Judged { nearest, ..nothing }
     }
 
     /// Whether what a fit leaves above the noise floor may be noise that the floor does not see.

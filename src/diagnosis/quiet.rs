@@ -47,13 +47,16 @@ fn believes_fast(axis: &Axis) -> bool {
 }
 
 /// Whether a quieter look has found what the look before has not: causes that explain all where none fitted, or more of them than it
-/// had. What is fast it does not add: there it stands in for what the low-pass smears. Nor does it doubt a belief that has something fast:
+/// had, or something that no cause fits and that the axis follows where there seemed to be nothing. What is fast it does not add: there it stands in for what the low-pass smears. Nor does it doubt a belief that has something fast:
 /// what a low-pass smears of that is no cause.
 #[must_use]
 pub fn finds_more(axis: &Axis, again: &Diagnosis, before: &Diagnosis) -> bool {
     let (found, known) = (causes(again), causes(before));
     let mut more = found.iter().filter(|cause| !known.contains(cause)).peekable();
     let slow = more.peek().is_some() && more.all(|cause| !is_fast(*cause));
+    if again.followed && again.verdict == Verdict::UnknownCause {
+        return before.verdict == Verdict::NoDiscrepancy;
+    }
     let doubts = before.verdict == Verdict::NoDiscrepancy && believes_fast(axis);
     again.verdict == Verdict::Explained
         && is_sure(again)

@@ -7,9 +7,10 @@ use super::fit::{Bench, Fit};
 use super::frame::Frame;
 use super::judge::{TOLERABLE_EXCESS, rms};
 use super::known::{Known, has_phase, numbers};
+use super::left::Left;
 use super::progress::{Stopped, Watch};
 use super::select::{Search, is_physical};
-use super::verdict::{Diagnosis, Left};
+use super::verdict::Diagnosis;
 use crate::machine::{Axis, Cause, Effect};
 
 /// Most steps of a fit.

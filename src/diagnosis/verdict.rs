@@ -12,8 +12,9 @@ use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
 use super::gain::{Gain, Replay};
 use super::holdout::Holdout;
-use super::judge::{Excess, Judge, Judged, refutation, refuted, rms, shows};
+use super::judge::{Judge, Judged, refutation, refuted, shows};
 use super::known::Known;
+use super::left::{Left, Unexplained, unexplained};
 use super::low_limit;
 use super::narrow::{self, Band};
 use super::progress::{Progress, Stopped, Watch, on_all_cores};
@@ -74,26 +75,6 @@ impl Finding {
     }
 }
 
-/// What is left of a channel.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Left {
-    /// RMS of the filtered residual.
-    pub rms: f64,
-    /// Its noise floor.
-    pub noise_rms: f64,
-    /// Where it lives, in words.
-    pub describes: String,
-}
-
-/// What is left.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Unexplained {
-    /// Of the torque, drive's own unit.
-    pub torque: Left,
-    /// Of table − encoder, load units, where a table was recorded.
-    pub table: Option<Left>,
-}
-
 /// The whole answer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Diagnosis {
@@ -113,6 +94,8 @@ pub struct Diagnosis {
     pub notes: Vec<String>,
     /// The axis with its effects.
     pub extended: Axis,
+    /// Whether the axis follows what is not explained.
+    pub(super) followed: bool,
     /// A closed loop of that or of its like, as it was replayed.
     pub(super) replay: Option<Replay>,
 }
@@ -302,7 +285,7 @@ fn answer_on(
             }
         }
     }
-    let Judged { mut verdict, selection: Selection { fit, .. }, gains, replay, .. } = judged;
+    let Judged { mut verdict, selection: Selection { fit, .. }, gains, replay, followed, .. } = judged;
     notes.extend(nameless(frame, &fit));
     if let Some(band) = vibration {
         verdict = band.beside(bench, verdict, &fit);
@@ -310,7 +293,18 @@ fn answer_on(
     }
     let shown = show::views(bench, vibration.map_or(&empty, |band| &band.before), &fit);
     let unexplained = unexplained(bench, &fit, &shown, whole.table.is_some());
-    Ok(Diagnosis { verdict, findings, gains, unexplained, shown, missing: Vec::new(), notes, extended, replay })
+    Ok(Diagnosis {
+        verdict,
+        findings,
+        gains,
+        unexplained,
+        shown,
+        missing: Vec::new(),
+        notes,
+        extended,
+        followed,
+        replay,
+    })
 }
 
 /// Puts a vibration among what was found beside it, largest share first, and says what a machine file cannot have of it.
@@ -341,31 +335,6 @@ fn aligned(recorded: &Recorded, frame: &Frame, late_s: f64, mut notes: Vec<Strin
     answer(recorded, &frame.aligned_by(late_s), notes)
 }
 
-/// What a fit leaves of each channel; `shown` is where that of the torque lives. A scale that repeats the encoder leaves nothing.
-#[must_use]
-pub fn unexplained(bench: &Bench, fit: &Fit, shown: &[View], with_scale: bool) -> Unexplained {
-    let [torque, mut table] = bench.rest(fit);
-    if with_scale {
-        table.resize(torque.len(), 0.0);
-    }
-    let excess = Excess::of(bench, fit, fit);
-    // Of nothing there is no noise.
-    let coarse = rms(&bench.frame.coarse_torque());
-    let noise = |rest: &[f64], torque| match (rms(rest) > 0.0, bench.frame.floor(rest, torque)) {
-        (true, seen) if torque => seen.hypot(coarse).min(seen.max(rms(rest))),
-        (true, seen) => seen,
-        (false, _) => 0.0,
-    };
-    let above_noise = |rest: &[f64], torque| (rms(rest) / noise(rest, torque)).powi(2) - 1.0;
-    let left = |rest: &[f64], channel: usize, views: &[View]| Left {
-        rms: rms(rest),
-        noise_rms: noise(rest, channel == 0),
-        describes: show::describe(views, above_noise(rest, channel == 0), excess.of_channel(channel)),
-    };
-    let of_table = || left(&table, 1, &show::against_all(bench.frame, &table, &table));
-    Unexplained { torque: left(&torque, 0, shown), table: (!table.is_empty()).then(of_table) }
-}
-
 fn extended_by(axis: &Axis, findings: &[Finding]) -> Axis {
     let effects: Vec<Effect> = findings.iter().map(|f| f.effect).collect();
     belief::extended(axis, &effects)
@@ -384,6 +353,7 @@ fn insufficient(axis: &Axis, missing: Vec<String>) -> Diagnosis {
         missing,
         notes: Vec::new(),
         extended: axis.clone(),
+        followed: false,
         replay: None,
     }
 }
