@@ -349,6 +349,13 @@ fn what_acts_on_the_hold_out_alone_is_unknown_there() {
     let d = with(0.3);
     assert_eq!((d.verdict, d.findings.len()), (Verdict::UnknownCause, 0));
     assert!(d.notes.iter().any(|note| note.contains("diagnose the hold-out by itself")), "{:?}", d.notes);
+    // Too few rows to be judged say nothing.
+    let whole = recording(|_, _, v, _| 0.3 * v.signum());
+    let first = |values: &[f64]| values[..600].to_vec();
+    let columns = whole.columns.iter().map(|column| Column::new(&column.name, first(&column.values))).collect();
+    let short = Recording::from_columns("short", first(&whole.time_s), columns).unwrap();
+    let d = diagnose(&axis(), &excerpt(&clean), Some(&excerpt(&short)), &|_, _| true).unwrap();
+    assert_eq!(d.verdict, Verdict::NoDiscrepancy, "{:?}", d.notes);
 }
 
 #[test]

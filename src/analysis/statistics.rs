@@ -72,6 +72,13 @@ pub fn grid(values: &[f64]) -> Option<f64> {
     (close.len() >= 4 && fitting * 20 >= close.len() * 19).then_some(step)
 }
 
+/// What a sensor itself is off by, by its readings: the more of white noise and the rounding to its grid, 1 σ, their unit; 0 where neither
+/// shows.
+#[must_use]
+pub fn reading_error(values: &[f64]) -> f64 {
+    white_noise(values).unwrap_or(0.0).max(grid(values).unwrap_or(0.0) / 12f64.sqrt())
+}
+
 /// Rows for which a moving signal keeps each value: 1 when every row is fresh, n when it is updated every n rows (a slower
 /// fieldbus, or a zero-order hold). Steps of one grid are ignored: they are slow motion, not a hold.
 #[must_use]

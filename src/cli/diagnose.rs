@@ -193,7 +193,9 @@ fn times_better(gain: &Gain) -> String {
     } else if ratio >= MOST_TIMES {
         format!("more than {MOST_TIMES} times better")
     } else {
-        format!("{ratio:.2} times better (95 %: {:.2} to {:.2})", gain.ci95[0], gain.ci95[1].min(MOST_TIMES))
+        let [least, most] = gain.ci95;
+        let most = if most < MOST_TIMES { format!("to {most:.2}") } else { "or more".to_owned() };
+        format!("{ratio:.2} times better (95 %: {least:.2} {most})")
     }
 }
 

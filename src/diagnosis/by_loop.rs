@@ -28,7 +28,6 @@ use super::verdict::{Diagnosis, Finding, Verdict, confidence};
 use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::added::ByServo;
-pub use replays::floor_of;
 use replays::{BLOCKS, Over, Replays, mean, mean_of_worse_half, misses};
 use trial::{Refined, Trial, starts};
 
@@ -74,7 +73,7 @@ pub fn completed(
         found.findings.iter().map(|finding| finding.effect).filter(about).map(|effect| effect.cause()).collect();
     let silent = !open || axis.effects.iter().any(about) || doubtful.len() > 1;
     let Some(known) = found.replay.as_ref().filter(|_| !silent) else { return Ok(found) };
-    let at_first = misses(&known.error, floor_of(&whole.position));
+    let at_first = misses(&known.error, statistics::reading_error(&whole.position));
     let much = is_much(&at_first);
     let Some(observed) = much.then(|| whole.observed()).flatten() else { return Ok(found) };
     let stays = found.extended.effects.iter().filter(|effect| !doubtful.contains(&effect.cause())).copied();

@@ -3,8 +3,8 @@
 //! Noise of a current sensor moves nothing. What acts on the axis does: the loop of the belief then misses the measured position, and
 //! what is left of the torque is what the servo made of that miss, a sum of it, of its speed and of its integral.
 
-use super::by_loop::floor_of;
 use super::fit::{Bench, Fit};
+use crate::analysis::statistics::reading_error;
 
 /// Share of the variance of what is left that goes with the miss from which on the axis follows it.
 const FOLLOWS: f64 = 0.1;
@@ -12,6 +12,9 @@ const FOLLOWS: f64 = 0.1;
 const LEAST_MISS: f64 = 3.2;
 /// How long the integral remembers, s: as long as usual servos do.
 const REMEMBERS_S: f64 = 0.1;
+
+/// What is said of a rest that the axis follows.
+pub const SAYS: &str = "what is left of the torque goes with no coordinate, and is no noise of its sensor: the axis follows it, and the closed loop misses the measured position by what it does";
 
 /// Whether the axis follows what is left of the torque by a fit without a cause; `error` is measured less replayed position at
 /// `time_s`, load units.
@@ -21,11 +24,11 @@ pub fn is_followed(bench: &Bench, empty: &Fit, time_s: &[f64], error: &[f64], po
     let miss = at_rows(&frame.columns.time_s, frame.columns.period_s, time_s, error);
     let judged = frame.kept.iter().map(|&row| miss[row]);
     let mean_square = judged.map(|miss| miss * miss).sum::<f64>() / frame.kept.len().max(1) as f64;
-    if !(mean_square.sqrt() > LEAST_MISS * floor_of(position)) {
+    if !(mean_square.sqrt() > LEAST_MISS * reading_error(position)) {
         return false;
     }
     let (mut speed, mut integral) = (vec![0.0; miss.len()], vec![0.0; miss.len()]);
-    let kept = 1.0 - frame.columns.period_s / REMEMBERS_S;
+    let kept = (-frame.columns.period_s / REMEMBERS_S).exp();
     for stretch in &frame.columns.stretches {
         for i in stretch.clone().skip(1) {
             speed[i] = miss[(i + 1).min(stretch.end - 1)] - miss[i - 1];

@@ -5,7 +5,7 @@ use super::frame::{Columns, Frame};
 use super::gain::{Gain, errors, of_both, weight_of_rows};
 use super::judge::{Excess, TOLERABLE_IF_UNTIED};
 use super::progress::{Stopped, Watch};
-use super::verdict::Verdict;
+use super::verdict::{Verdict, what_is_missing};
 use crate::machine::Axis;
 use crate::plant::added::ByServo;
 use crate::plant::observed::Observed;
@@ -53,7 +53,11 @@ impl Holdout {
         let base = belief::base_alone(extended);
         let frame = Frame::new(&base, &self.thinned, None);
         let masses = extended.two_masses().unwrap_or_default();
-        let beyond = Excess::of_machine(extended, &masses.iter().fold(frame, Frame::after_first_swings)).largest();
+        let frame = masses.iter().fold(frame, Frame::after_first_swings);
+        if !what_is_missing(&frame).is_empty() {
+            return None;
+        }
+        let beyond = Excess::of_machine(extended, &frame).largest();
         let note = || {
             format!(
                 "the hold-out leaves {:.1} times its noise, and nothing that the recording shows explains it: something acts there that does not act here; diagnose the hold-out by itself, too",

@@ -9,7 +9,7 @@
 use super::belief;
 use super::contact;
 use super::fit::{Bench, Fit};
-use super::followed::is_followed;
+use super::followed::{self, is_followed};
 use super::foreign;
 use super::frame::{Columns, Frame};
 use super::gain::{self, Errors, Gain, HeldOut, Replay};
@@ -48,9 +48,6 @@ pub const MOST_OF_A_CURVE: f64 = 0.03;
 /// Least ratio of what a machine errs by without causes over what it errs by with them for a channel to show them. In the balance
 /// a cause must take 4 % off the amplitude of what is left; a row as it was measured holds more noise.
 const LEAST_RATIO: f64 = 1.02;
-
-/// What is said of such a rest.
-const FOLLOWED: &str = "what is left of the torque goes with no coordinate, and is no noise of its sensor: the axis follows it, and the closed loop misses the measured position by what it does";
 
 /// What stays the same while sets of causes are judged.
 pub struct Judge<'j, 'f, 'a> {
@@ -186,7 +183,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             gains: self.held_out.gains(self.believed.as_ref(), self.believed.as_ref()),
             replay: self.believed.as_ref().and_then(|errors| errors.replay.clone()),
             refutation: None,
-            nearest: (followed && untied).then(|| FOLLOWED.to_owned()),
+            nearest: (followed && untied).then(|| followed::SAYS.to_owned()),
             followed,
         }
     }

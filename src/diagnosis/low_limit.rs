@@ -14,6 +14,8 @@ use crate::machine::Cause;
 
 /// Most causes in all: more together imitate much.
 const MOST: usize = 2;
+/// Share of what is there that such a motor must explain by itself, for causes beside it to be looked for.
+const LEAST: f64 = 0.3;
 
 /// What is judged, or where that is an unknown cause what is found with such a motor among the causes, where that is to be named.
 ///
@@ -27,6 +29,12 @@ pub fn or_else(
 ) -> Result<Judged, Stopped> {
     let is_motor = |law: &Law| law.cause == Cause::TorqueSaturation;
     if judged.verdict != Verdict::UnknownCause || !laws.iter().any(|law| is_motor(law)) {
+        return Ok(judged);
+    }
+    let empty = bench.fit(Vec::new());
+    let alone = bench.parts(&AT_ANY_LEVEL, bench.starts(&AT_ANY_LEVEL, &empty)).into_iter();
+    let left = alone.map(|part| bench.fit(vec![part]).squares()).fold(f64::INFINITY, f64::min);
+    if left > (1.0 - LEAST) * empty.squares() {
         return Ok(judged);
     }
     let others = laws.iter().filter(|law| !BELIEF.contains(&law.cause) && !is_motor(law)).copied();

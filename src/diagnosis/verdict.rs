@@ -358,7 +358,8 @@ fn insufficient(axis: &Axis, missing: Vec<String>) -> Diagnosis {
     }
 }
 
-fn what_is_missing(frame: &Frame) -> Vec<String> {
+/// What rows lack for anything to be said of them; nothing where they suffice.
+pub(super) fn what_is_missing(frame: &Frame) -> Vec<String> {
     let mut missing = Vec::new();
     let (word, torque) = (frame.axis.drive.torque_word(), &frame.columns.torque);
     if let Some(first) = torque.first().filter(|first| torque.iter().all(|value| value == *first)) {

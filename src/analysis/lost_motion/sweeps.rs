@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::analysis::motion::{smallest_travel, turning_points};
-use crate::analysis::statistics::{grid, quantile, white_noise};
+use crate::analysis::statistics::{quantile, reading_error};
 
 /// Motor and table of one axis over an unbroken piece of a recording; lengths in mm, or angles in degrees.
 pub(super) struct Track {
@@ -72,7 +72,7 @@ impl Track {
     /// Takes `inertia`·acceleration and `viscous`·speed, in effort per 1/s² and 1/s, off an effort that stands for the
     /// difference.
     pub fn take_off_motion(&mut self, inertia: f64, viscous: f64) {
-        let noise = white_noise(&self.motor).unwrap_or(0.0).max(grid(&self.motor).unwrap_or(0.0) / 12f64.sqrt());
+        let noise = reading_error(&self.motor);
         for sweep in self.fine_sweeps() {
             let half = self.half_window(&sweep.rows, noise);
             // The row of a turn ends one sweep and begins the next.
@@ -93,7 +93,7 @@ impl Track {
     fn sweep(&self, rows: Range<usize>, first: bool) -> Sweep {
         let motor = &self.motor[rows.clone()];
         let direction = (motor[motor.len() - 1] - motor[0]).signum();
-        let noise = white_noise(motor).unwrap_or(0.0).max(grid(motor).unwrap_or(0.0) / 12f64.sqrt());
+        let noise = reading_error(motor);
         let half = self.half_window(&rows, noise);
         let speeds: Vec<f64> = rows.clone().map(|row| self.speed(row, half)).collect();
         let forward: Vec<f64> = speeds.iter().map(|v| v * direction).filter(|v| *v > 0.0).collect();

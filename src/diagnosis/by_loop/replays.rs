@@ -57,7 +57,7 @@ impl<'r> Replays<'r> {
         let part = Part { rows: whole.rows.min(known.error.len()), ..whole };
         let rows = part.rows;
         let begun = rows_of_the_beginning(known.axis.servo.as_ref()?, observed).min(rows / MOST_OF_ROWS);
-        let floor = floor_of(&observed.position);
+        let floor = statistics::reading_error(&observed.position);
         if !(floor > 0.0) || rows - begun < 10 * BLOCKS {
             return None;
         }
@@ -139,13 +139,6 @@ fn blocks_of(rows: usize) -> impl Iterator<Item = Range<usize>> {
 
 fn mean_square(error: &[f64]) -> f64 {
     error.iter().map(|e| e * e).filter(|square| square.is_finite()).sum::<f64>() / error.len().max(1) as f64
-}
-
-/// What an encoder itself is off by, by its readings, in their unit.
-#[must_use]
-pub fn floor_of(position: &[f64]) -> f64 {
-    let grid = statistics::grid(position).unwrap_or(0.0);
-    statistics::white_noise(position).unwrap_or(0.0).max(grid / 12f64.sqrt())
 }
 
 /// How far each block of rows is missed: ½·ln(1 + mean square over that of what the encoder itself is off by).
