@@ -3,9 +3,10 @@
 //! Positions drift half a step at the old speed, forces act at the middle, positions drift the other half at the new speed
 //! (position Verlet: second order, keeps the energy of a spring); dry friction is solved implicitly within the kick and
 //! viscous friction as the mean of old and new speed. The motor's torque follows the servo's exactly:
-//! T(t + h) = u + (T − u)·e^(−h/τ), and a step feels its mean.
+//! T(t + h) = u + (T − u)·e^(−h/τ), and a step feels its mean. Steps are as short as flanks need that swing; while they are
+//! calm, they are as long as all else needs.
 
-use super::coupling::transmitted;
+use super::coupling::{LONGER, Leaning, longest_step_s, transmitted};
 use super::friction::{Bristle, Elements, Friction};
 use super::nearby::Nearby;
 use super::physics::Physics;
@@ -15,16 +16,34 @@ use crate::machine::TwoMasses;
 #[derive(Debug, Clone)]
 pub struct Body {
     physics: Physics,
-    /// Plant step, s.
-    step_s: f64,
+    time_constant_s: f64,
     load_per_motor: f64,
-    /// Rest and mean over a step of a first-order lag.
-    lag: (f64, f64),
+    pace: Pace,
+    /// Longest step while flanks are calm, s; `None` where they are never told to be.
+    calm_step_s: Option<f64>,
+    /// Whether they were in the last steps.
+    calm: bool,
     plain: bool,
     viscous: f64,
     /// Of motor and table.
     held: [Held; 2],
     state: State,
+}
+
+/// A plant step.
+#[derive(Debug, Clone, Copy)]
+struct Pace {
+    step_s: f64,
+    /// Rest and mean over a step of a first-order lag.
+    lag: (f64, f64),
+}
+
+impl Pace {
+    fn new(step_s: f64, time_constant_s: f64) -> Self {
+        let ratio = step_s / time_constant_s;
+        let lag = if time_constant_s > 0.0 { ((-ratio).exp(), -(-ratio).exp_m1() / ratio) } else { (0.0, 0.0) };
+        Self { step_s, lag }
+    }
 }
 
 /// What no register can hold of a mass.
@@ -46,6 +65,13 @@ struct State {
     motor: Mass,
     /// Follows nothing on a rigid axis.
     table: Mass,
+}
+
+/// What the link carried in a step, as [`Leaning::add`] takes it.
+struct Carried {
+    torque: f64,
+    rate: f64,
+    speeds: [f64; 2],
 }
 
 /// One mass and its share of friction.
@@ -77,9 +103,16 @@ impl Mass {
 }
 
 impl Body {
-    /// A body at a position and speed (motor's coordinate), its motor's current at `torque`.
+    /// A body at a position and speed (motor's coordinate), its motor's current at `torque`. Its steps are of `step_s`, and no longer
+    /// than `longest_s` where nothing swings.
     #[must_use]
-    pub fn new(physics: Physics, step_s: f64, time_constant_s: f64, position: f64, velocity: f64, torque: f64) -> Body {
+    pub fn new(
+        physics: Physics,
+        [step_s, longest_s]: [f64; 2],
+        time_constant_s: f64,
+        [position, velocity]: [f64; 2],
+        torque: f64,
+    ) -> Body {
         let mass = |inertia: f64, share: f64| {
             let Friction { bristle, .. } = physics.bristle(share);
             Mass { inertia, share, position, velocity, bristle }
@@ -96,46 +129,77 @@ impl Body {
                 (mass(masses.motor_inertia, 1.0 - share), table)
             }
         };
-        let lag = if time_constant_s > 0.0 {
-            let ratio = step_s / time_constant_s;
-            ((-ratio).exp(), -(-ratio).exp_m1() / ratio)
-        } else {
-            (0.0, 0.0)
-        };
+        // Friction that builds up over a way has a swing of its own.
+        let flanks = physics.two_masses.filter(|masses| masses.clearance > 0.0 && physics.presliding.is_none());
+        let lightest = |masses: &TwoMasses| masses.motor_inertia.min(masses.table_inertia);
+        let calm_step_s = flanks.map(|masses| longest_s.min(LONGER * longest_step_s(&masses, lightest(&masses))));
         let plain = physics.is_plain();
         let load_per_motor = 1.0 / physics.motor_per_load;
         let viscous = physics.slope_at(1.0);
         let held = [(); 2].map(|()| Held { near: Nearby::new(&physics), elements: physics.bristle(1.0).elements });
         let state = State { time_s: 0.0, torque, motor, table };
-        Body { physics, step_s, load_per_motor, lag, plain, viscous, held, state }
+        let pace = Pace::new(step_s, time_constant_s);
+        let calm_step_s = calm_step_s.filter(|calm| *calm > step_s);
+        Body { physics, time_constant_s, load_per_motor, pace, calm_step_s, calm: false, plain, viscous, held, state }
     }
 
     /// Advances by `steps` plant steps while the servo asks for `asked`.
     pub fn advance(&mut self, asked: f64, steps: usize) {
+        let Some(calm_step_s) = self.calm_step_s else { return self.step::<false>(asked, steps, self.pace) };
+        let span = steps as f64 * self.pace.step_s;
+        let few = (span / calm_step_s).ceil() as usize;
+        if self.calm && few < steps {
+            let before = self.state;
+            self.step::<true>(asked, few, Pace::new(span / few as f64, self.time_constant_s));
+            if self.calm {
+                return;
+            }
+            self.state = before;
+        }
+        self.step::<true>(asked, steps, self.pace);
+    }
+
+    /// Steps at a pace; `FLANKS` says whether it is to be known if they are calm.
+    fn step<const FLANKS: bool>(&mut self, asked: f64, steps: usize, pace: Pace) {
         let mut state = self.state;
         let mut held = std::mem::take(&mut self.held);
         let own = &mut held;
+        let mut leaning = Leaning::default();
         match (&self.physics.two_masses, self.plain) {
-            (None, true) => (0..steps).for_each(|_| self.rigid_step::<true>(own, &mut state, asked)),
-            (None, false) => (0..steps).for_each(|_| self.rigid_step::<false>(own, &mut state, asked)),
-            (Some(m), true) => (0..steps).for_each(|_| self.two_mass_step::<true>(m, own, &mut state, asked)),
-            (Some(m), false) => (0..steps).for_each(|_| self.two_mass_step::<false>(m, own, &mut state, asked)),
+            (None, true) => (0..steps).for_each(|_| self.rigid_step::<true>(pace, own, &mut state, asked)),
+            (None, false) => (0..steps).for_each(|_| self.rigid_step::<false>(pace, own, &mut state, asked)),
+            (Some(m), true) => (0..steps).for_each(|_| {
+                let carried = self.two_mass_step::<true>(m, pace, own, &mut state, asked);
+                if FLANKS {
+                    leaning.add(carried.torque, carried.rate, carried.speeds);
+                }
+            }),
+            (Some(m), false) => (0..steps).for_each(|_| {
+                let carried = self.two_mass_step::<false>(m, pace, own, &mut state, asked);
+                if FLANKS {
+                    leaning.add(carried.torque, carried.rate, carried.speeds);
+                }
+            }),
         }
         (self.state, self.held) = (state, held);
+        if let Some(masses) = self.physics.two_masses.filter(|_| FLANKS && steps > 0) {
+            let both = masses.motor_inertia + masses.table_inertia;
+            self.calm = leaning.is_calm(&masses, masses.motor_inertia * masses.table_inertia / both);
+        }
     }
 
     /// Mean torque of the motor over a step.
     #[inline(always)]
-    fn motor_torque(&self, state: &mut State, asked: f64) -> f64 {
+    fn motor_torque(&self, pace: Pace, state: &mut State, asked: f64) -> f64 {
         let excess = state.torque - asked;
-        state.torque = asked + excess * self.lag.0;
-        asked + excess * self.lag.1
+        state.torque = asked + excess * pace.lag.0;
+        asked + excess * pace.lag.1
     }
 
     #[inline(always)]
-    fn rigid_step<const PLAIN: bool>(&self, [own, _]: &mut [Held; 2], state: &mut State, asked: f64) {
-        let (h, p) = (self.step_s, &self.physics);
-        let torque = self.motor_torque(state, asked);
+    fn rigid_step<const PLAIN: bool>(&self, pace: Pace, [own, _]: &mut [Held; 2], state: &mut State, asked: f64) {
+        let (h, p) = (pace.step_s, &self.physics);
+        let torque = self.motor_torque(pace, state, asked);
         let m = &mut state.motor;
         let middle = m.middle(h);
         if PLAIN {
@@ -153,15 +217,17 @@ impl Body {
     fn two_mass_step<const PLAIN: bool>(
         &self,
         masses: &TwoMasses,
+        pace: Pace,
         [at_motor, at_table]: &mut [Held; 2],
         state: &mut State,
         asked: f64,
-    ) {
-        let (h, p) = (self.step_s, &self.physics);
-        let torque = self.motor_torque(state, asked);
+    ) -> Carried {
+        let (h, p) = (pace.step_s, &self.physics);
+        let torque = self.motor_torque(pace, state, asked);
         let (motor, table) = (&mut state.motor, &mut state.table);
         let (motor_middle, table_middle) = (motor.middle(h), table.middle(h));
-        let push = transmitted(masses, motor_middle - table_middle, motor.velocity - table.velocity);
+        let (rate, speed) = (motor.velocity - table.velocity, table.velocity);
+        let push = transmitted(masses, motor_middle - table_middle, rate);
         if PLAIN {
             let level = p.coulomb();
             motor.kick(&mut at_motor.elements, h, motor_middle, torque - push, self.viscous, level);
@@ -177,6 +243,7 @@ impl Body {
             table.kick(&mut at_table.elements, h, table_middle, push - load, p.slope_at(table.velocity), level);
         }
         state.time_s += h;
+        Carried { torque: push, rate, speeds: [speed, table.velocity] }
     }
 
     /// Motor position, motor's coordinate.

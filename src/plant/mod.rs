@@ -2,6 +2,7 @@
 
 pub mod added;
 pub mod axis;
+mod behind;
 pub mod between;
 pub mod bridges;
 pub mod closed_loop;

@@ -10,13 +10,12 @@
 //! for that cycle and the motor followed with time constant τ, so the row is later than the smooth torque of the motion:
 //! see [`Lateness`].
 
+use super::behind::table_motion;
 use super::between::{cubic_at, shift};
-use super::coupling::{Giving, longest_step_s, transmitted};
 use super::friction::Friction;
 use super::lateness::Lateness;
 use super::linear::{decomposed, rms};
 use super::motion::{Motion, passed, smoothed};
-use super::nearby::Nearby;
 use super::observed::Observed;
 use super::physics::{Physics, Ripple};
 use crate::machine::{Axis, TwoMasses};
@@ -200,84 +199,6 @@ fn is_elsewhere(
     let [count, sum, squares] = apart.fold([0.0; 3], sums);
     let spread = (squares / f64::max(count, 1.0) - (sum / f64::max(count, 1.0)).powi(2)).max(0.0).sqrt();
     spread > ELSEWHERE * masses.clearance * per_scale
-}
-
-/// Where the table is at each row, motor's coordinate, and the torque that it takes from a motor that moves as measured: it is simulated
-/// behind its spring or clearance.
-fn table_motion<'o>(
-    physics: &'o Physics,
-    masses: TwoMasses,
-    observed: &'o Observed,
-    run: Range<usize>,
-) -> impl Iterator<Item = (f64, f64)> + 'o {
-    let scale = physics.motor_per_load;
-    let motion = &observed.motion;
-    let share = masses.table_friction_share;
-    let mut friction = physics.bristle(share);
-    let at = move |i: usize| (motion.position[i] * scale, motion.velocity(i) * scale);
-    let mut near = Nearby::new(physics);
-    let per_scale = 1.0 / scale;
-    let mut recoil = [0.0; 3];
-    let (mut q, mut w) = at(run.start);
-    // A table in motion is already pushed by its motor.
-    q -= if w == 0.0 { 0.0 } else { (0.5 * masses.clearance).copysign(w) };
-    let mut place = q;
-    // Place at the next row, and the mean of the torque until there.
-    let mut mean_after = move |i: usize| {
-        let span = observed.time_s[i + 1] - observed.time_s[i];
-        let steps = (span / longest_step_s(&masses, masses.table_inertia)).ceil().clamp(1.0, 1000.0);
-        let h = span / steps;
-        let (per_span, per_step, mobility) = (1.0 / span, 1.0 / steps, h / masses.motor_inertia);
-        let ((q0, w0), (q1, w1)) = (at(i), at(i + 1));
-        let mut sum = 0.0;
-        let giving = Giving::new(span, h);
-        for step in 0..steps as usize {
-            let s = (step as f64 + 0.5) * per_step;
-            let (motor, speed) = hermite(q0, w0 * span, q1, w1 * span, s);
-            let t = observed.time_s[i] - observed.time_s[0] + s * span;
-            let middle = q + 0.5 * h * w;
-            let (x, v) = (middle * per_scale, w * per_scale);
-            let [give, giving_speed, _] = recoil;
-            let through = transmitted(&masses, motor + give - middle, (speed * per_span + giving_speed) - w);
-            sum += through;
-            if masses.clearance > 0.0 {
-                recoil = giving.step(recoil, through, mobility);
-            }
-            let push = through - (near.load(physics, x, v, t) + share * physics.slope_friction(w));
-            let next = friction.step(
-                masses.table_inertia,
-                masses.table_inertia * w + h * push,
-                h,
-                w,
-                share * near.friction_level(physics, x, v, t),
-            );
-            q = middle + 0.5 * h * next;
-            w = next;
-        }
-        (q, sum / steps)
-    };
-    // A row stands between the mean before it and the one after it.
-    let mut before = None;
-    let last = run.end - 1;
-    run.map(move |i| {
-        let here = place;
-        let after = (i < last).then(|| {
-            let (next, torque) = mean_after(i);
-            place = next;
-            torque
-        });
-        let torque = match (std::mem::replace(&mut before, after), after) {
-            (Some(before), Some(after)) => 0.5 * (before + after),
-            (one, other) => one.or(other).unwrap_or(0.0),
-        };
-        (here, torque)
-    })
-}
-
-/// Value and slope (per unit of `s`) of the cubic through two points with two slopes.
-fn hermite(a: f64, da: f64, b: f64, db: f64, s: f64) -> (f64, f64) {
-    let (c2, c3) = (3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db);
-    (a + s * (da + s * (c2 + s * c3)), da + s * (2.0 * c2 + s * 3.0 * c3))
 }
 
 /// Estimates the phases of cogging and vibration from the first quarter of the rows, where the axis moves; a ripple of

@@ -46,7 +46,7 @@ pub struct Start {
 /// What a simulation does besides the machine file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setup {
-    /// Longest plant step, s; a servo cycle is divided into whole steps, and a stiff drive makes them finer.
+    /// Longest plant step, s; a servo cycle is divided into whole steps, and a stiff drive makes them finer where it swings.
     pub step_s: f64,
     /// How many times longer the steps are than either asks for; of a spring's no more than twice.
     pub coarser: f64,
@@ -156,7 +156,8 @@ pub fn simulate_cycles(
     let mut log = TorqueLog::new(servo, physics.delay_s, start.torque);
     let table = physics.clone();
     let (position, velocity) = (start.position * scale, start.velocity * scale);
-    let mut body = Body::new(physics, step_s, servo.torque_time_constant_s, position, velocity, start.torque);
+    let steps_s = [step_s, setup.coarser * setup.step_s];
+    let mut body = Body::new(physics, steps_s, servo.torque_time_constant_s, [position, velocity], start.torque);
     let mut control = ServoLoop::new(servo, axis.base.torque_limit, position, velocity, start.torque);
 
     // The value read is that of `late` cycles and `fine` steps ago.
