@@ -35,6 +35,6 @@ pub fn put_right(bench: &Bench, set: &Fit, fit: &Fit) -> Option<Fit> {
     let starts = bench.parts(law, (law.manner.restarts)(shape)).into_iter();
     let starts = starts.map(|part| (figure(&bench.joined(set, &part)), part));
     let (_, part) = starts.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let again = refined(bench, set, part);
+    let again = refined(bench, set, part, set.squares());
     if is_within_bounds(bench, &again, new) { Some(again) } else { means::told(bench, set, &again.parts[new]) }
 }

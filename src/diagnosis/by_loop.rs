@@ -8,8 +8,11 @@
 //! which no law holds to. Such causes are tried as rivals alone. A servo that is another one than is believed is no cause of the
 //! vocabulary, and none explains what it makes.
 
+mod itself;
 mod replays;
 mod trial;
+
+pub(super) use replays::{Over, mean, misses, strength};
 
 use super::belief;
 use super::causes::{ABOUT_REVERSALS, LAWS, Law, law};
@@ -19,7 +22,7 @@ use super::fit::Bench;
 use super::frame::{Columns, Frame};
 use super::gain;
 use super::holdout::Holdout;
-use super::judge::{Excess, LITTLE_LEFT, TOLERABLE_EXCESS, refuted, rms, shows};
+use super::judge::{Excess, LITTLE_LEFT, TOLERABLE_EXCESS, refuted, shows};
 use super::known::Known;
 use super::left::unexplained;
 use super::progress::{Stopped, Watch};
@@ -28,14 +31,12 @@ use super::verdict::{Diagnosis, Finding, Verdict, confidence};
 use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::added::ByServo;
-use replays::{BLOCKS, Over, Replays, mean, mean_of_worse_half, misses};
+use replays::{NOTHING, Replays, mean_of_worse_half};
 use trial::{Refined, Trial, starts};
 
 /// Misses from which on the loop has something to say: half of the blocks are missed, in the geometric mean, by more than twice what the
 /// encoder itself is off by.
 const MUCH: f64 = 0.9;
-/// The miss of a block by no more than the encoder itself is off by.
-const NOTHING: f64 = 0.35;
 /// Share of the misses beyond that which a cause must explain in rows that gave none of its numbers.
 const LEAST_EXPLAINED: f64 = 0.4;
 /// Mean over scatter of what it gains in each block, times √blocks.
@@ -52,6 +53,9 @@ const TRIED: usize = 3;
 const GIVES: Over = Over::Half(0);
 const JUDGES: Over = Over::Half(1);
 
+/// The same where the torque is left with much that no cause explains.
+const MOSTLY: f64 = 0.6;
+
 const STAGE: &str = "asking the closed loop";
 
 /// An answer with what only the loop tells beside it, where its machine was replayed; `frame` is what the torque is judged on.
@@ -65,12 +69,13 @@ pub fn completed(
     found: Diagnosis,
     watch: &Watch,
 ) -> Result<Diagnosis, Stopped> {
-    let open = matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained | Verdict::UnknownCause);
+    let found = itself::settled(found, whole, frame, watch);
     let about = |effect: &Effect| ABOUT_REVERSALS.contains(&effect.cause());
     // One that the torque names may stand in for another, and gives way to that. Where more of these are there the loop misses by what
     // their numbers are off by, for which another stands in.
     let doubtful: Vec<Cause> =
         found.findings.iter().map(|finding| finding.effect).filter(about).map(|effect| effect.cause()).collect();
+    let open = matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained | Verdict::UnknownCause);
     let silent = !open || axis.effects.iter().any(about) || doubtful.len() > 1;
     let Some(known) = found.replay.as_ref().filter(|_| !silent) else { return Ok(found) };
     let at_first = misses(&known.error, statistics::reading_error(&whole.position));
@@ -83,7 +88,7 @@ pub fn completed(
     let servo = ByServo::of(axis, &observed);
     let recording = (&observed, &servo);
     let Some(replays) = Replays::new(recording, known, watch) else { return Ok(found) };
-    let told = told(axis, &replays, frame, [&found.extended, &without], watch)?;
+    let told = told(axis, &replays, (frame, whole), [&found.extended, &without], watch)?;
     let Some(told) = told.filter(|told| !doubtful.contains(&told.finding.effect.cause())) else { return Ok(found) };
     let extended = belief::extended(&without, &[told.finding.effect]);
     let elsewhere = holdout.and_then(|holdout| Holdout::new(axis, holdout.columns.as_ref().ok()?));
@@ -108,7 +113,7 @@ pub fn completed(
     let rest = 1.0 - findings.iter().map(|finding| finding.share).sum::<f64>().min(1.0);
     findings.push(Finding { share: rest * told.finding.share, ..told.finding });
     findings.sort_by(|a, b| b.share.total_cmp(&a.share));
-    Ok(Diagnosis { verdict: Verdict::Explained, findings, gains, unexplained, notes, extended, ..found })
+    Ok(Diagnosis { verdict: told.verdict, findings, gains, unexplained, notes, extended, ..found })
 }
 
 /// Whether the loop has something to say.
@@ -118,6 +123,7 @@ fn is_much(misses: &[f64]) -> bool {
 
 /// What the loop tells.
 struct Told {
+    verdict: Verdict,
     finding: Finding,
     /// What a reader is told of how it was found.
     note: String,
@@ -129,32 +135,45 @@ struct Told {
 fn told(
     axis: &Axis,
     replays: &Replays,
-    frame: &Frame,
+    (frame, whole): (&Frame, &Columns),
     [named, extended]: [&Axis; 2],
     watch: &Watch,
 ) -> Result<Option<Told>, Stopped> {
-    let Some(before) = replays.error(named) else { return Ok(None) };
+    let Some((before, unavoidable)) = replays.error(named).zip(replays.missed_by_sensors(named)) else {
+        return Ok(None);
+    };
     let misses = replays.misses(&before);
-    if !is_much(&misses) {
+    let avoidable: Vec<f64> = misses.iter().zip(&unavoidable).map(|(miss, by)| miss - by.max(NOTHING)).collect();
+    if !is_much(&misses) || !is_much(&avoidable.iter().map(|miss| miss + NOTHING).collect::<Vec<_>>()) {
         return Ok(None);
     }
     let best = promising(axis, &replays.beginning(), frame, extended, watch)?;
-    let enough = |over| LEAST_EXPLAINED * (mean(&misses, over) - NOTHING);
+    let enough = |over| LEAST_EXPLAINED * mean(&avoidable, over);
     let hopeful = mean(&misses, GIVES) - HOPE * enough(GIVES);
-    let refined = watch.each(&best, (0.99, 0.995), STAGE, |trial| {
-        let refined = trial.clone().refined(frame, extended, replays, GIVES, hopeful)?;
+    let refine = |trial: Trial| {
+        let refined = trial.refined(frame, extended, replays, GIVES, hopeful)?;
         let gained: Vec<f64> = misses.iter().zip(replays.misses(&refined.error)).map(|(b, a)| b - a).collect();
         Some((mean(&gained, JUDGES), gained, refined))
-    })?;
+    };
+    let refined = watch.each(&best, (0.99, 0.995), STAGE, |trial| refine(trial.clone()))?;
     let mut refined: Vec<(f64, Vec<f64>, Refined)> = refined.into_iter().flatten().collect();
     refined.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let spring = refined.first().and_then(|(gain, _, best)| Some((*gain, best.trial.as_spring(frame, extended)?)));
+    if let Some((gain, spring)) = spring.and_then(|(gain, spring)| Some((gain, refine(spring)?))) {
+        refined.retain(|(.., other)| other.trial.law.cause != Cause::DriveCompliance || spring.0 < ALIKE * gain);
+        refined.insert(usize::from(spring.0 < ALIKE * gain), spring);
+    }
     let Some((gain, gained, half)) = refined.first() else { return Ok(None) };
     let explains = *gain >= enough(JUDGES)
-        && strength(gained) > SURELY
+        && strength(gained, &misses, JUDGES) > SURELY
         && half.trial.acts_in_few_rows()
         && !half.trial.is_stopped();
-    let by_half = half.trial.on(frame, extended).filter(|with| explains && !is_gainsaid(frame, named, with));
-    let Some(by_half) = by_half else { return Ok(None) };
+    let Some(by_half) = half.trial.on(frame, extended).filter(|_| explains) else { return Ok(None) };
+    let verdict = match by_torque((frame, whole), replays, [named, &by_half]) {
+        Some(Verdict::PartlyExplained) if *gain < MOSTLY * mean(&avoidable, JUDGES) => return Ok(None),
+        Some(verdict) => verdict,
+        None => return Ok(None),
+    };
     let alike = refined[1..].iter().filter(|other| other.0 > ALIKE * gain);
     let alike: Vec<Cause> = alike.map(|other| other.2.trial.law.cause).collect();
     let Some(whole) = half.trial.clone().refined(frame, extended, replays, Over::All, f64::INFINITY) else {
@@ -165,19 +184,19 @@ fn told(
     let finding = Finding {
         effect,
         deviations,
-        confidence: confidence(strength(gained)),
+        confidence: confidence(strength(gained, &misses, JUDGES)),
         share: 1.0 - (-2.0 * gain).exp(),
         evidence: (law(cause).sentence)(&effect, frame.axis),
         next_experiment: alike.first().map(|other| experiment::telling(frame, cause, *other)),
         indistinguishable_from: alike,
     };
-    let [missed, left] = [&before, &whole.error].map(|error| 1e3 * rms(error));
+    let [missed, left] = [&before, &whole.error].map(|error| 1e3 * replays.typically(&replays.misses(error)));
     let unit = if frame.axis.drive.is_rotary() { "thousandths of a degree" } else { "µm" };
     let note = format!(
-        "{} is told by the closed loop, not by the torque: replayed without it the loop misses the measured position by {missed:.3} {unit}, with it by {left:.3} {unit}",
+        "{} is told by the closed loop, not by the torque: replayed without it the loop typically misses the measured position by {missed:.3} {unit}, with it by {left:.3} {unit}",
         cause.name()
     );
-    Ok(Some(Told { finding, note, by_half }))
+    Ok(Some(Told { verdict, finding, note, by_half }))
 }
 
 /// The causes that take most off what a machine misses in the beginning of the recording, each where it takes most.
@@ -223,21 +242,24 @@ fn promising(
     Ok(near.into_iter().filter(|(missed, _)| gain(*missed) >= RIVAL * most).map(|(_, trial)| trial).collect())
 }
 
-/// Mean over scatter, times √blocks, of what is gained in each block of those that judge.
-fn strength(gained: &[f64]) -> f64 {
-    let judging: Vec<f64> = (0..BLOCKS).filter(|block| JUDGES.has(*block)).map(|block| gained[block]).collect();
-    statistics::strength(&judging)
-}
-
-/// Whether the torque gainsays a machine with a cause more: it then is off by more than noise, and by more than before.
-fn is_gainsaid(frame: &Frame, before: &Axis, with: &Axis) -> bool {
+/// What the torque lets a machine with a cause more explain: all, if it then is off by no more than noise, or than a recording of that
+/// very machine would be, since behind a motor that is known to a step of its encoder a table swings by that step; a part, if it is off by
+/// no more than before; `None` where it gainsays the machine.
+fn by_torque((frame, whole): (&Frame, &Columns), replays: &Replays, [before, with]: [&Axis; 2]) -> Option<Verdict> {
     let excess = |axis| Excess::of_machine(axis, frame).largest();
-    let after = excess(with);
-    after > LITTLE_LEFT && (after > TOLERABLE_EXCESS || after > excess(before))
+    let (before, after) = (excess(before), excess(with));
+    if after <= LITTLE_LEFT || after <= TOLERABLE_EXCESS && after <= before {
+        return Some(Verdict::Explained);
+    }
+    if itself::is_as_much(replays, (frame, whole), with) == Some(true) {
+        return Some(Verdict::Explained);
+    }
+    (after <= before).then_some(Verdict::PartlyExplained)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::replays::BLOCKS;
     use super::*;
     use crate::diagnosis::gain::HeldOut;
     use crate::diagnosis::left::{Left, Unexplained};

@@ -176,6 +176,23 @@ impl Columns {
         Observed::from_columns(copy.time_s, copy.position, copy.torque, command, copy.table, copy.stretches)
     }
 
+    /// The first rows, with another position and torque and nothing beside them.
+    #[must_use]
+    pub fn with_motion(&self, position: Vec<f64>, torque: Vec<f64>) -> Columns {
+        let rows = position.len();
+        let within = |s: &Range<usize>| s.start.min(rows)..s.end.min(rows);
+        Columns {
+            time_s: self.time_s[..rows].to_vec(),
+            known: self.known[..rows].to_vec(),
+            stretches: self.stretches.iter().map(within).filter(|s| !s.is_empty()).collect(),
+            position,
+            torque,
+            command: None,
+            table: None,
+            ..*self
+        }
+    }
+
     /// Of how many recorded rows one is the mean; its error is the mean of theirs.
     #[must_use]
     pub fn rows_in_one(&self) -> f64 {

@@ -3,6 +3,8 @@
 //! displacement is worth depends on it. The search knows one bristle and one spread of elements; here the exponents are refined, and
 //! another formulation than the plain bristle is taken where it is known to be better.
 
+pub mod by_position;
+
 use super::causes::presliding_friction::{BRISTLE, ELEMENTS, ELEMENTS_AS_BRISTLE, OF_ANY_EXPONENT};
 use super::causes::{Law, law};
 use super::fit::{Bench, Fit, Part};

@@ -11,6 +11,7 @@ use super::contact;
 use super::fit::{Bench, Fit};
 use super::followed::{self, is_followed};
 use super::foreign;
+use super::formulation::by_position;
 use super::frame::{Columns, Frame};
 use super::gain::{self, Errors, Gain, HeldOut, Replay};
 use super::known::Known;
@@ -120,6 +121,12 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
                 (found.fit, found.alike, errors) = (less, Vec::new(), without);
                 let Some(still) = self.explains(&found.fit) else { return Ok(self.too_little(&found)) };
                 verdict = still;
+            }
+        }
+        if let Some(of_bristle) = &errors {
+            let bristle = (&found.fit, of_bristle);
+            if let Some((fit, its)) = by_position::told(self.bench, &self.held_out, bristle, self.watch)? {
+                (found.fit, found.alike, errors) = (fit, Vec::new(), Some(its));
             }
         }
         let mut weighed = self.weighed(&found.fit, errors.as_ref(), verdict);

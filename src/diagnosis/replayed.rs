@@ -76,7 +76,7 @@ pub fn refined(bench: &Bench, held_out: &HeldOut, judged: &Judged, watch: &Watch
         let rows = observed.position.iter().zip(position).skip(begun);
         rows.map(|(measured, replayed)| finite(measured - replayed)).collect()
     };
-    let coarse = Part { rows, coarser: COARSER };
+    let coarse = Part { rows, coarser: COARSER, ..Part::whole(observed) };
     let sure = uncertainty::of_unknowns(bench, fit);
     let stopped = stopped(fit, &sure);
     // The phases of ripples are the recording's own, and the torque's noise has turned them: they are open beside the unknowns.

@@ -39,6 +39,9 @@ pub const LEAST_GAIN: f64 = 0.08;
 /// What a further fitted number must gain where sets of causes compete.
 pub const NUMBER_PRICE: f64 = 0.003;
 
+/// Squares over those that a set must come down to at which it is not refined any more.
+const FAR_OFF: f64 = 2.0;
+
 /// What is said while sets are refined.
 const FITTING: &str = "fitting causes";
 
@@ -158,7 +161,7 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
         let of_fewer = best.last().map_or(f64::INFINITY, price);
         best.push(first.clone());
         rivals = grown.iter().skip(1).take(4).cloned().collect();
-        grown.truncate(BEAM);
+        grown.truncate(if may_gain(search.bench, first) { BEAM } else { 1 });
         // What a set of fewer causes does as well has gone astray.
         grown.retain(|fit| price(fit) < of_fewer);
         beam = grown;
@@ -209,6 +212,11 @@ fn grown_on(search: &Search, found: Selection) -> Result<Selection, Stopped> {
 /// Whether nothing is left beyond noise and what a coarse grid of the torque may make: what takes more off follows its steps.
 fn is_lost_in_steps(bench: &Bench, fit: &Fit) -> bool {
     bench.frame.columns.torque_step > 0.0 && Excess::of(bench, fit, fit).largest() <= 0.0
+}
+
+/// Whether so much is left above noise that another set may be better by as much as a cause must gain.
+fn may_gain(bench: &Bench, fit: &Fit) -> bool {
+    Excess::of(bench, fit, fit).largest().ln_1p() > LEAST_GAIN
 }
 
 /// Whether a set is worth going on from where another price was reached.
@@ -312,7 +320,7 @@ fn with_one_more(
         *count <= TRIED && child.within_reach(most) < carried_on
     });
     children.sort_by_key(|child| !child.part.law.is_simulated());
-    let mut fits = watch.each(&children, (half, to), FITTING, |child| child.refined(bench))?;
+    let mut fits = watch.each(&children, (half, to), FITTING, |child| child.refined(bench, child.set.squares()))?;
     let sound = fits.iter().filter(|fit| is_physical(bench, fit));
     let best = cheapest(sound.chain(others).chain(open.iter().map(|(set, _)| *set)));
     if let Some(best) = best.filter(|best| leaves_much(bench, best)) {
@@ -320,7 +328,7 @@ fn with_one_more(
         let before = price(best);
         let begun = watch.each(&rare, (to, to), FITTING, |(set, law)| {
             let child = at_seldom_starts(bench, set, law).filter(|child| child.within_reach(most) < before)?;
-            Some((child.refined(bench), child))
+            Some((child.refined(bench, best.squares()), child))
         })?;
         let (more_fits, more): (Vec<_>, Vec<_>) = begun.into_iter().flatten().unzip();
         fits.extend(more_fits);
@@ -353,13 +361,17 @@ fn of_form(bench: &Bench, fit: &Fit) -> Fit {
     if is_physical(bench, &formed) { formed } else { fit.clone() }
 }
 
-/// A set with a cause more, first fitted by itself, then with the others.
+/// A set with a cause more, first fitted by itself, then with the others. One that will not come down to so many squares is left as
+/// far as it came.
 #[must_use]
-pub fn refined(bench: &Bench, set: &Fit, part: Part) -> Fit {
+pub fn refined(bench: &Bench, set: &Fit, part: Part, squares: f64) -> Fit {
     let mut parts = set.parts.clone();
     parts.push(part);
     let count = set.parts.len();
-    let fit = bench.refine_roughly(bench.fit(parts), count, 6);
+    let fit = bench.refine_towards(bench.fit(parts), count, 6, squares);
+    if fit.squares() > FAR_OFF * squares {
+        return fit;
+    }
     let fit = bench.refine_roughly(fit, 0, if count == 0 { 4 } else { 2 });
     means::told_again(bench, formulation::suited(bench, fit, 2))
 }

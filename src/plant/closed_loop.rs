@@ -10,7 +10,7 @@ use super::observed::Observed;
 use super::physics::{Physics, Ripple};
 use super::predict::{TorquePrediction, predict_torque};
 use super::servo::{CommandSpeed, by_clock};
-use super::simulate::{Rows, Setup, Start, simulate_cycles, steps_per_cycle};
+use super::simulate::{Rows, Sensors, Setup, Start, simulate_cycles, steps_per_cycle};
 use crate::machine::{Axis, Servo};
 use std::iter::Peekable;
 use std::ops::Range;
@@ -142,6 +142,21 @@ impl Manner {
         part: Part,
         turned: &[f64],
     ) -> Result<Option<Vec<f64>>, String> {
+        Ok(self.recorded(axis, (observed, servo), part, turned, &[])?.map(|[position, _]| position))
+    }
+
+    /// The same with the torque of some rows.
+    ///
+    /// # Errors
+    /// As [`predict`].
+    pub fn recorded(
+        &self,
+        axis: &Axis,
+        (observed, servo): (&Observed, &ByServo),
+        part: Part,
+        turned: &[f64],
+        torque_of: &[Range<usize>],
+    ) -> Result<Option<[Vec<f64>; 2]>, String> {
         let mut physics = Physics::of(axis)?;
         let mut turned = turned.iter();
         for (ripple, phase) in physics.cogging.iter_mut().chain(&mut physics.vibration).zip(&self.phases) {
@@ -153,25 +168,27 @@ impl Manner {
         let torque = TorquePrediction { torque: Vec::new(), at_start: self.at_start, physics, phases_unknown: 0 };
         let by = usize::from(self.command_speed != CommandSpeed::Central);
         let added = servo.added[by].as_ref().filter(|_| self.felt).map_or(&[][..], |added| &added.torque);
-        let replayed = replay(axis, observed, &torque, &[], added, self.command_speed, part)?;
-        Ok(replayed.map(|(replayed, _)| replayed.position))
+        let replayed = replay(axis, observed, &torque, torque_of, added, self.command_speed, part)?;
+        Ok(replayed.map(|(replayed, torque)| [replayed.position, torque]))
     }
 }
 
-/// How much of a recording is replayed, and how finely.
+/// How much of a recording is replayed, how finely, and through what sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Part {
     /// The first so many rows.
     pub rows: usize,
     /// How many times longer the plant steps are than usual.
     pub coarser: f64,
+    /// What servo and rows read.
+    pub sensors: Sensors,
 }
 
 impl Part {
-    /// All of a recording as usual.
+    /// All of a recording as usual, through ideal sensors.
     #[must_use]
     pub fn whole(observed: &Observed) -> Self {
-        Self { rows: observed.time_s.len(), coarser: 1.0 }
+        Self { rows: observed.time_s.len(), coarser: 1.0, sensors: Sensors::default() }
     }
 
     /// As many rows as a number of plant steps suffices for that are so many times longer than usual.
@@ -320,7 +337,8 @@ fn replay(
     let position = measured.or(command.peek().copied()).unwrap_or(0.0);
     let torque = finite(prediction.at_start).unwrap_or(0.0);
     let start = Start { position, velocity, torque };
-    let setup = Setup { coarser: part.coarser, start: Some(start), command_speed, ..Setup::default() };
+    let Part { coarser, sensors, .. } = part;
+    let setup = Setup { coarser, sensors, start: Some(start), command_speed, ..Setup::default() };
     // The rows of a recording made once a servo cycle are the cycles themselves.
     let place = |row: usize| {
         let exact = (time[row] - begin) / servo.period_s;

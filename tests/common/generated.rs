@@ -42,6 +42,16 @@ pub fn rig() -> Rig {
 
 /// What is said of a rig as believed by a recording of another with something changed: verdict and named causes with their first value.
 pub fn said([believed, rig]: [&Rig; 2], seed: u64, change: impl Fn(&mut Truth)) -> (String, Vec<(String, f64)>) {
+    said_believing(Vec::new(), [believed, rig], seed, change)
+}
+
+/// The same where effects are believed as well.
+pub fn said_believing(
+    effects: Vec<Value>,
+    [believed, rig]: [&Rig; 2],
+    seed: u64,
+    change: impl Fn(&mut Truth),
+) -> (String, Vec<(String, f64)>) {
     let mut truth = Truth::of(rig);
     change(&mut truth);
     let mut random = Random::new(seed, 7);
@@ -57,7 +67,7 @@ pub fn said([believed, rig]: [&Rig; 2], seed: u64, change: impl Fn(&mut Truth)) 
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     run.write(rig, &at("run.csv")).unwrap();
-    std::fs::write(at("machine.json"), believed.machine_file("rig", Vec::new()).to_string()).unwrap();
+    std::fs::write(at("machine.json"), believed.machine_file("rig", effects).to_string()).unwrap();
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_gib"));
     command.arg("diagnose").arg("--machine").arg(at("machine.json")).arg("--recording").arg(at("run.csv"));
     let output = command.arg("--json").arg(at("said.json")).output().unwrap();

@@ -8,17 +8,27 @@ use crate::machine::Axis;
 use crate::plant::added::ByServo;
 use crate::plant::closed_loop::{Part, rows_of_the_beginning};
 use crate::plant::observed::Observed;
+use crate::plant::simulate::Sensors;
 use std::ops::Range;
 
 /// Contiguous blocks of rows. Each counts alike: where an axis that sticks breaks loose a cycle sooner or later one of them holds more
 /// error than all others.
 pub const BLOCKS: usize = 48;
+/// The miss of a block by no more than the encoder itself is off by.
+pub const NOTHING: f64 = 0.35;
 /// Most plant steps of a replay: 40 s at the usual ones. Longer steps are no help, they put impacts elsewhere.
 const MOST_STEPS: usize = 1_600_000;
 /// The same where causes are tried that may not be worth it.
 const MOST_STEPS_TRIED: usize = 600_000;
+/// How long an axis stands before that is a long rest, s.
+const LONG_REST_S: f64 = 0.1;
+/// Fewest rows of a block that are none.
+const FEWEST_ROWS: f64 = 10.0;
 /// The beginning, of which nobody knows how the servo stood, is no larger part of the rows than one in so many.
 const MOST_OF_ROWS: usize = 4;
+
+/// Noise of a sensor over its grid that readings at rest may hide.
+const FLICKER: f64 = 0.2;
 
 /// Which blocks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +52,8 @@ pub struct Replays<'r> {
     recording: (&'r Observed, &'r ByServo),
     part: Part,
     begun: usize,
+    /// Rows but for long rests.
+    heard: Vec<bool>,
     /// What the encoder itself is off by, and the whole way of the axis, load units.
     floor: f64,
     stroke: f64,
@@ -57,13 +69,14 @@ impl<'r> Replays<'r> {
         let part = Part { rows: whole.rows.min(known.error.len()), ..whole };
         let rows = part.rows;
         let begun = rows_of_the_beginning(known.axis.servo.as_ref()?, observed).min(rows / MOST_OF_ROWS);
+        let heard = rows_but_for_long_rests(observed, rows);
         let floor = statistics::reading_error(&observed.position);
         if !(floor > 0.0) || rows - begun < 10 * BLOCKS {
             return None;
         }
         let known_ones = observed.position.iter().copied().filter(|x| x.is_finite());
         let (low, high) = known_ones.fold((f64::MAX, f64::MIN), |(low, high), x| (x.min(low), x.max(high)));
-        Some(Self { known, recording, part, begun, floor, stroke: high - low, watch })
+        Some(Self { known, recording, part, begun, heard, floor, stroke: high - low, watch })
     }
 
     /// The same of fewer rows, for what is to be quick.
@@ -71,10 +84,10 @@ impl<'r> Replays<'r> {
     pub fn beginning(&self) -> Self {
         let short = Part::of_steps(&self.known.axis, self.recording.0, MOST_STEPS_TRIED, 1.0);
         let rows = short.rows.max(self.begun + 10 * BLOCKS).min(self.part.rows);
-        Self { part: Part { rows, ..short }, ..*self }
+        Self { part: Part { rows, ..short }, heard: self.heard[..rows].to_vec(), ..*self }
     }
 
-    /// Measured less replayed position of a machine with the ripples of the known one, after the beginning; rows that are not known miss
+    /// Measured less replayed position of a machine with the ripples of the known one after the beginning; rows that are not known miss
     /// nothing. `None` where the replay runs away, and when the watch's caller said stop: replays are most of the work.
     #[must_use]
     pub fn error(&self, axis: &Axis) -> Option<Vec<f64>> {
@@ -86,16 +99,58 @@ impl<'r> Replays<'r> {
         error.iter().all(|error| error.abs() < self.stroke).then_some(error)
     }
 
+    /// How far each block of a machine is missed that is as it is replayed, since its servo follows what the encoder is off by: what no
+    /// cause explains. `None` as for [`Replays::error`].
+    #[must_use]
+    pub fn missed_by_sensors(&self, axis: &Axis) -> Option<Vec<f64>> {
+        let [position, _] = self.through(self.sensors().pop()?, axis)?;
+        let ideal = self.known.manner.replayed(axis, self.recording, self.part, &[]).ok()??;
+        let rows = position.iter().zip(&ideal).skip(self.begun);
+        Some(self.misses(&rows.map(|(sensed, ideal)| sensed - ideal).collect::<Vec<_>>()))
+    }
+
+    /// Position and torque that recordings of a machine would show through such an encoder, the torque exactly.
+    pub fn recordings_of(&self, axis: &Axis) -> impl Iterator<Item = [Vec<f64>; 2]> {
+        self.sensors().into_iter().filter_map(move |sensors| self.through(sensors, axis))
+    }
+
+    /// The sensors that this recording may be made by. Where readings rest they hide noise that is small beside their grid, and where there
+    /// is none an axis swings about one step: either is possible.
+    fn sensors(&self) -> Vec<Sensors> {
+        let grid = statistics::grid(&self.recording.0.position).unwrap_or(0.0);
+        let noise = (self.floor.powi(2) - grid * grid / 12.0).max(0.0).sqrt();
+        let of = |noise: f64| Sensors { grid_um: 1e3 * grid, noise_um: 1e3 * noise, ..Sensors::default() };
+        if noise < FLICKER * grid { vec![of(noise), of(FLICKER * grid)] } else { vec![of(noise)] }
+    }
+
+    fn through(&self, sensors: Sensors, axis: &Axis) -> Option<[Vec<f64>; 2]> {
+        self.watch.at(0.98, STAGE).ok()?;
+        let part = Part { sensors, ..self.part };
+        self.known.manner.recorded(axis, self.recording, part, &[], &[0..part.rows]).ok()?
+    }
+
     /// The rows of each block after the beginning.
     #[must_use]
     pub fn blocks(&self) -> Vec<Range<usize>> {
         blocks_of(self.part.rows - self.begun).collect()
     }
 
-    /// How far each block is missed, see [`misses`].
+    /// How far each block is missed, see [`misses`], but for long rests; one that is nothing else by as much as the encoder is off by.
     #[must_use]
     pub fn misses(&self, error: &[f64]) -> Vec<f64> {
-        misses(error, self.floor)
+        let heard = &self.heard[self.begun..];
+        let miss = |rows: Range<usize>| {
+            let heard = error[rows.clone()].iter().zip(&heard[rows]).filter(|(_, heard)| **heard);
+            let (sum, count) = heard.fold((0.0, 0.0), |(sum, count), (error, _)| (sum + error * error, count + 1.0));
+            miss_of(if count < FEWEST_ROWS { 1.0 } else { sum / count / self.floor.powi(2) })
+        };
+        self.blocks().into_iter().map(miss).collect()
+    }
+
+    /// The typical error of such misses, load units: the geometric mean of blocks, above what the encoder itself is off by.
+    #[must_use]
+    pub fn typically(&self, misses: &[f64]) -> f64 {
+        self.floor * (2.0 * mean(misses, Over::All)).exp_m1().sqrt()
     }
 
     /// The weight by which the squares of each block count, so that all count alike.
@@ -133,6 +188,29 @@ pub fn mean_of_worse_half(of_blocks: &[f64], over: Over) -> f64 {
     missed.iter().sum::<f64>() / missed.len().max(1) as f64
 }
 
+/// Mean over scatter, times √blocks, of the share that is gained of what is missed in each block, over that half of some blocks which was
+/// missed most.
+#[must_use]
+pub fn strength(gained: &[f64], misses: &[f64], over: Over) -> f64 {
+    let mut judging: Vec<usize> = (0..BLOCKS).filter(|block| over.has(*block)).collect();
+    judging.sort_by(|a, b| misses[*b].total_cmp(&misses[*a]));
+    judging.truncate(judging.len().div_ceil(2));
+    let share = |&block: &usize| (gained[block] / (misses[block] - NOTHING).max(NOTHING)).clamp(-1.0, 1.0);
+    statistics::strength(&judging.iter().map(share).collect::<Vec<_>>())
+}
+
+/// Which rows are not of a long rest: where within its friction an axis came to rest is partly chance, and that is not to count over and
+/// over.
+fn rows_but_for_long_rests(observed: &Observed, rows: usize) -> Vec<bool> {
+    let (motion, standing) = (&observed.motion, observed.motion.standing_speed());
+    let mut since = 0;
+    let is_heard = |row: usize| {
+        since = if motion.velocity(row).abs() > standing { row } else { since };
+        (row - since) as f64 * observed.period_s <= LONG_REST_S
+    };
+    (0..rows).map(is_heard).collect()
+}
+
 fn blocks_of(rows: usize) -> impl Iterator<Item = Range<usize>> {
     (0..BLOCKS).map(move |block| block * rows / BLOCKS..(block + 1) * rows / BLOCKS)
 }
@@ -144,5 +222,9 @@ fn mean_square(error: &[f64]) -> f64 {
 /// How far each block of rows is missed: ½·ln(1 + mean square over that of what the encoder itself is off by).
 #[must_use]
 pub fn misses(error: &[f64], floor: f64) -> Vec<f64> {
-    blocks_of(error.len()).map(|rows| 0.5 * (1.0 + mean_square(&error[rows]) / floor.powi(2)).ln()).collect()
+    blocks_of(error.len()).map(|rows| miss_of(mean_square(&error[rows]) / floor.powi(2))).collect()
+}
+
+fn miss_of(mean_square: f64) -> f64 {
+    0.5 * mean_square.ln_1p()
 }

@@ -3,7 +3,8 @@
 use super::replays::{Over, Replays};
 use crate::diagnosis::belief;
 use crate::diagnosis::causes::presliding_friction::{BRISTLE, OF_ANY_EXPONENT};
-use crate::diagnosis::causes::{Law, Resistance, Rest, Scale};
+use crate::diagnosis::causes::table_side::swing_of;
+use crate::diagnosis::causes::{Law, Resistance, Rest, Scale, law};
 use crate::diagnosis::fit::pseudo_inverse;
 use crate::diagnosis::frame::Frame;
 use crate::diagnosis::uncertainty::{SIMULATED, widening};
@@ -26,6 +27,8 @@ const EVERY_SPRING: usize = 3;
 const TABLE: [f64; 3] = [0.25, 0.45, 0.65];
 const FRICTION: [f64; 3] = [0.35, 0.55, 0.75];
 const CONTACT_HZ: [f64; 2] = [500.0, 800.0];
+/// Damping ratio at which a spring is tried in place of flanks.
+const SPRING_DAMPING: f64 = 0.03;
 /// Steps of refining at most, and those after which it must be hopeful.
 const STEPS: usize = 12;
 const FEW: usize = 3;
@@ -135,6 +138,19 @@ impl Trial {
     #[must_use]
     pub fn acts_in_few_rows(&self) -> bool {
         !self.linear
+    }
+
+    /// The spring that a clearance is whose flanks give more under the friction of the table, to either side, than it is wide: one may be as
+    /// good, and then is the simpler cause.
+    #[must_use]
+    pub fn as_spring(&self, frame: &Frame, axis: &Axis) -> Option<Self> {
+        let masses = self.on(frame, axis)?.two_masses().ok()??;
+        let gives = 2.0 * masses.table_friction_share * frame.belief.coulomb / masses.stiffness;
+        let mut shape = swing_of(&masses);
+        // Flanks that meet are damped more than any spring.
+        *shape.last_mut()? = SPRING_DAMPING;
+        let spring = || Self { law: law(Cause::DriveCompliance), shape, ..self.clone() };
+        (self.law.cause == Cause::Backlash && gives > masses.clearance).then(spring)
     }
 
     /// Whether a number has gone as far as its law lets it: what asks for more is no such cause.
@@ -338,4 +354,51 @@ fn inverse(normal: DMatrix<f64>) -> Option<DMatrix<f64>> {
     let unit = normal.diagonal().map(|square| if square > 0.0 { square.sqrt().recip() } else { 0.0 });
     let units = DMatrix::from_diagonal(&unit);
     Some(&units * pseudo_inverse(&units * normal * &units, 1e-6)? * &units)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::belief::base_alone;
+    use crate::diagnosis::frame::Columns;
+    use crate::machine::Machine;
+
+    #[test]
+    fn soft_flanks_with_hardly_any_play_are_a_spring() {
+        let axis = Machine::parse(include_str!("../../../examples/machines/believed.json")).unwrap().axes.remove(0);
+        let rows: Vec<f64> = (0..2000).map(|i| (f64::from(i) * 1e-3 * 3.0).sin()).collect();
+        let columns = Columns {
+            time_s: (0..2000).map(|i| f64::from(i) * 1e-3).collect(),
+            position: rows.clone(),
+            torque: rows,
+            known: vec![true; 2000],
+            command: None,
+            table: None,
+            stretches: vec![0..2000],
+            torque_step: 0.0,
+            position_grid: 0.0,
+            table_grid: 0.0,
+            period_s: 1e-3,
+            recorded_period_s: 1e-3,
+            left_out: 0,
+        };
+        let base = base_alone(&axis);
+        let frame = Frame::new(&base, &columns, None);
+        let flanks = |width_um: f64, contact_hz: f64| Trial {
+            law: law(Cause::Backlash),
+            shape: vec![width_um, 0.55, 0.6, contact_hz],
+            coefficients: Vec::new(),
+            open: false,
+            linear: false,
+        };
+        let spring = flanks(0.5, 150.0).as_spring(&frame, &axis).unwrap();
+        let Some(Effect::DriveCompliance { resonance_hz, table_inertia_share, table_friction_share, .. }) =
+            spring.effect(&frame)
+        else {
+            panic!()
+        };
+        assert!((resonance_hz - 150.0).abs() < 1.0, "{resonance_hz}");
+        assert!((table_inertia_share - 0.55).abs() < 1e-6 && (table_friction_share - 0.6).abs() < 1e-6);
+        assert!(flanks(20.0, 700.0).as_spring(&frame, &axis).is_none());
+    }
 }

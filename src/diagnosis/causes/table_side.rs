@@ -91,7 +91,7 @@ fn terms_of(frame: &Frame, resistance: &Resistance, splits: &[Option<TwoMasses>]
 
 /// Tables that are simulated side by side: each step waits for the one before it, so that several cost little more than one.
 /// A table by itself is simulated by itself.
-const LANES: usize = 8;
+const LANES: usize = 4;
 /// The same under resistances of their own, which a row has to fetch for each.
 const FEW: usize = 4;
 /// Radians of the fastest swing to a step: of a spring, whose swing is all that there is, and of flanks.

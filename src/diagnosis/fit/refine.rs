@@ -13,21 +13,29 @@ use std::sync::Arc;
 const SHARES: [f64; 4] = [1.0, 0.3, 0.09, 0.027];
 /// Share of what the step before took off that one by the same slopes must for another to be made by them.
 const FAIR: f64 = 0.3;
+/// How many times as much as the last step, in ln of the squares, each of those that are left may take off.
+const AMPLE: f64 = 3.0;
 
 impl Bench<'_, '_> {
     /// Refines the non-linear parameters of the parts from index `first` on, until a step brings nothing.
     #[must_use]
     pub fn refine(&self, fit: Fit, first: usize, most: usize) -> Fit {
-        self.refine_while(fit, first, most, 1e-5)
+        self.refine_while(fit, first, most, Until { gains: 1e-5, squares: f64::INFINITY })
     }
 
     /// The same until a step takes less than a thousandth off the squares: enough to compare sets of causes.
     #[must_use]
     pub fn refine_roughly(&self, fit: Fit, first: usize, most: usize) -> Fit {
-        self.refine_while(fit, first, most, 1e-3)
+        self.refine_towards(fit, first, most, f64::INFINITY)
     }
 
-    fn refine_while(&self, fit: Fit, first: usize, most: usize, least: f64) -> Fit {
+    /// The same as long as so few squares are within reach.
+    #[must_use]
+    pub fn refine_towards(&self, fit: Fit, first: usize, most: usize, squares: f64) -> Fit {
+        self.refine_while(fit, first, most, Until { gains: 1e-3, squares })
+    }
+
+    fn refine_while(&self, fit: Fit, first: usize, most: usize, until: Until) -> Fit {
         let mut fit = self.at_one(fit);
         let mut steps = 0;
         while steps < most {
@@ -38,17 +46,17 @@ impl Bench<'_, '_> {
             let Some(next) = self.stepped(&fit, &slopes, &SHARES) else { break };
             let gained = 1.0 - next.squares() / fit.squares();
             fit = self.at_one(next);
-            if gained < least {
+            steps += 1;
+            if gained < until.gains || until.is_out_of_reach(&fit, gained, most - steps) {
                 break;
             }
-            steps += 1;
             // Slopes are most of the work, and at a new place not far from what they were: as long as a step by them takes off a fair
             // share of what the one before did, they do for another (chord method).
             let mut gained = gained;
             while steps < most {
                 let Some(next) = self.stepped(&fit, &slopes, &SHARES[..1]) else { break };
                 let more = 1.0 - next.squares() / fit.squares();
-                if more < least {
+                if more < until.gains {
                     break;
                 }
                 fit = self.at_one(next);
@@ -120,6 +128,23 @@ impl Bench<'_, '_> {
         let mut parts = fit.parts;
         parts.splice(at..=at, own);
         self.fit(parts)
+    }
+}
+
+/// Until when a fit is refined.
+#[derive(Clone, Copy)]
+struct Until {
+    /// Share of the squares that a step must take off for another to be made.
+    gains: f64,
+    /// What must be within reach.
+    squares: f64,
+}
+
+impl Until {
+    /// Whether a fit whose last step took off this share of its squares will hardly come so far down in as many more.
+    fn is_out_of_reach(&self, fit: &Fit, gained: f64, more: usize) -> bool {
+        let needed = (fit.squares() / self.squares).ln();
+        needed > -AMPLE * more as f64 * (1.0 - gained).ln()
     }
 }
 

@@ -34,10 +34,10 @@ impl<'s> Child<'s> {
         Self { set, part: part.clone(), price: price(set) + figure - set.figure(), elsewhere }
     }
 
-    /// The set with it, from its best start, and from one in another valley if that leaves much.
+    /// The set with it, from its best start, and from one in another valley if that leaves much; see [`refined`] for the squares.
     #[must_use]
-    pub fn refined(&self, bench: &Bench) -> Fit {
-        let from = |part: &Part| refined(bench, self.set, part.clone());
+    pub fn refined(&self, bench: &Bench, squares: f64) -> Fit {
+        let from = |part: &Part| refined(bench, self.set, part.clone(), squares);
         let fit = from(&self.part);
         let other = self.elsewhere.as_ref().filter(|_| leaves_much(bench, &fit)).map(from);
         other.filter(|other| price(other) < price(&fit) && is_physical(bench, other)).unwrap_or(fit)

@@ -1,0 +1,69 @@
+//! Fast rows of a coarse encoder: what a table behind a spring needs of its motor is lost in what the grid makes of the acceleration,
+//! and a simulated table swings by the grid alone. Such a spring is found all the same, and one that is believed is not doubted for its
+//! swing.
+
+#[path = "../examples/scoreboard/board/mod.rs"]
+#[allow(dead_code)]
+mod board;
+#[path = "common/generated.rs"]
+#[allow(dead_code)]
+mod generated;
+
+use generated::{Coupling, Rig, ServoGains, Truth, rig, said, said_believing};
+use serde_json::json;
+use std::f64::consts::TAU;
+
+const RESONANCE_HZ: f64 = 92.0;
+const TABLE: [f64; 2] = [0.58, 0.3];
+const DAMPING: f64 = 0.04;
+
+/// Four rows a millisecond, half a micrometre a step.
+fn coarse() -> Rig {
+    let servo = ServoGains {
+        period: 2.5e-4,
+        position_gain: 12.0,
+        velocity_gain: 0.16,
+        integral_time: Some(0.05),
+        feedforward: 0.9,
+        lag: 0.0,
+        ..rig().servo
+    };
+    Rig { servo, encoder_step: 5e-4, ..rig() }
+}
+
+/// The spring: stiffness and damping in the motor's coordinate.
+fn spring(truth: &mut Truth) {
+    let [inertia_share, friction_share] = TABLE;
+    let reduced = truth.inertia * inertia_share * (1.0 - inertia_share);
+    let omega = TAU * RESONANCE_HZ;
+    let (stiffness, damping) = (omega * omega * reduced, 2.0 * DAMPING * omega * reduced);
+    truth.coupling = Some(Coupling { stiffness, damping, clearance: 0.0, inertia_share, friction_share });
+}
+
+#[test]
+fn a_spring_that_swings_by_the_grid_is_found() {
+    for seed in [1, 2] {
+        let (verdict, findings) = said([&coarse(), &coarse()], seed, spring);
+        println!("seed {seed}: {verdict} {findings:?}");
+        let [(cause, hz)] = findings.as_slice() else { panic!("{verdict}: {findings:?}") };
+        assert!(cause == "drive_compliance" && (hz / RESONANCE_HZ - 1.0).abs() < 0.1, "{cause} {hz}");
+    }
+}
+
+#[test]
+fn a_spring_that_is_believed_is_not_doubted_for_swinging_by_the_grid() {
+    let rig = coarse();
+    let [inertia_share, friction_share] = TABLE;
+    let reduced = rig.inertia * inertia_share * (1.0 - inertia_share);
+    let stiffness_n_um = (TAU * RESONANCE_HZ).powi(2) * reduced / (rig.unit * 1e-3).powi(2) * 1e-6;
+    let parameters = json!({
+        "resonance_hz": RESONANCE_HZ, "stiffness_n_um": stiffness_n_um, "table_inertia_share": inertia_share,
+        "table_friction_share": friction_share, "damping_ratio": DAMPING
+    });
+    let effect = json!({ "cause": "drive_compliance", "parameters": parameters });
+    for seed in [3, 4] {
+        let (verdict, findings) = said_believing(vec![effect.clone()], [&rig, &rig], seed, spring);
+        println!("seed {seed}: {verdict} {findings:?}");
+        assert_eq!((verdict.as_str(), findings.as_slice()), ("no_discrepancy", &[][..]), "seed {seed}");
+    }
+}
