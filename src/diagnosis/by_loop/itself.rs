@@ -1,6 +1,8 @@
-//! What a machine leaves of a recording of its own. Behind a motor that is known to a step of its encoder a simulated table swings by
-//! that step, at its own frequency and as long as its damping lets it: what the balance of the torque is off by then is none of the
-//! machine's, and no reason to doubt it.
+//! What a machine leaves of a recording of its own. A servo answers what its encoder is off by, and a simulated table behind a motor that
+//! is known to a step of its encoder swings by that step, at its own frequency and as long as its damping lets it: what the balance of the
+//! torque is off by then is none of the machine's, and no reason to doubt it. (A parametric bootstrap, Efron 1979.) On 22 random
+//! machines as believed the variance that was left was 0.38 to 1.06 of what they leave of recordings of their own, on 16 with something
+//! that has no name 1.5 and more.
 
 use super::replays::Replays;
 use crate::diagnosis::belief;
@@ -16,7 +18,7 @@ use crate::plant::added::ByServo;
 const AS_MUCH: f64 = 1.3;
 
 /// What is said of it.
-const SAYS: &str = "what is left is as much as a recording of this very machine would leave: behind an encoder of this grid and noise its simulated table swings by the grid";
+const SAYS: &str = "what is left is no more than a recording of this very machine would leave behind an encoder of this grid and noise";
 
 /// Whether a machine leaves no more of the torque than of a recording of its own; `None` where that cannot be told: a scale tells more.
 pub fn is_as_much(replays: &Replays, (frame, whole): (&Frame, &Columns), machine: &Axis) -> Option<bool> {
@@ -41,10 +43,14 @@ pub fn is_as_much(replays: &Replays, (frame, whole): (&Frame, &Columns), machine
     Some(squares < AS_MUCH * (swings + noise))
 }
 
-/// An answer that doubts a machine with a table, or leaves something beside it, by no more than that.
+/// An answer that doubts a machine, or leaves something beside what was found, by no more than that.
 pub fn settled(mut found: Diagnosis, whole: &Columns, frame: &Frame, watch: &Watch) -> Diagnosis {
-    let doubts = matches!(found.verdict, Verdict::UnknownCause | Verdict::PartlyExplained);
-    let Some(known) = found.replay.as_ref().filter(|_| doubts && belief::parts_table(&found.extended)) else {
+    let doubts = match found.verdict {
+        Verdict::UnknownCause => true,
+        Verdict::PartlyExplained => belief::parts_table(&found.extended),
+        _ => false,
+    };
+    let Some(known) = found.replay.as_ref().filter(|_| doubts) else {
         return found;
     };
     let Some(observed) = whole.observed() else { return found };
