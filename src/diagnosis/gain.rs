@@ -133,6 +133,12 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
         Self { axis, kept, bench, watch, observed, half, weight }
     }
 
+    /// What of the axis stays beside what is found.
+    #[must_use]
+    pub fn kept(&self) -> &Axis {
+        self.kept
+    }
+
     /// Errors of the belief alone; `None` where nothing can be predicted.
     #[must_use]
     pub fn believed(&self) -> Option<Errors> {

@@ -8,6 +8,7 @@
 
 use super::belief;
 use super::contact;
+use super::delayed;
 use super::fit::{Bench, Fit};
 use super::followed::{self, is_followed};
 use super::foreign;
@@ -99,6 +100,10 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     /// # Errors
     /// [`Stopped`] when the watch's caller said so.
     pub fn judge(&self, mut found: Selection) -> Result<Judged, Stopped> {
+        let kept = self.held_out.kept();
+        if let Some(without) = delayed::left_out(self.bench, kept, &found.fit) {
+            (found.fit, found.alike) = (without, Vec::new());
+        }
         let Some(mut verdict) = self.explains(&found.fit) else { return Ok(self.too_little(&found)) };
         if let Some(goes) = foreign::stands_for(self.bench, &self.empty, &found.fit, self.watch)? {
             return Ok(Judged { refutation: Some(imitation(&found.fit, goes)), ..self.nothing(&found) });

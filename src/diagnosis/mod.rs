@@ -17,6 +17,7 @@ mod choice;
 mod columns;
 mod contact;
 mod creep;
+mod delayed;
 mod excerpt;
 pub mod experiment;
 pub mod filter;
