@@ -17,7 +17,7 @@ skip() { echo "checked_memory: $kind skipped, $1"; exit 0; }
 
 # caught COMMAND...: it must fail
 caught() {
-    if "$@" >"$out/seed.log" 2>&1; then
+    if "$@" >"$out/$kind-seed.log" 2>&1; then
         echo "checked_memory: not caught: $*" >&2
         exit 1
     fi
@@ -25,7 +25,7 @@ caught() {
 
 # clean COMMAND...: it must not fail; what it says is shown when it does
 clean() {
-    "$@" >"$out/run.log" 2>&1 || { tail -n 40 "$out/run.log" >&2; echo "checked_memory: failed: $*" >&2; exit 1; }
+    "$@" >"$out/$kind.log" 2>&1 || { tail -n 40 "$out/$kind.log" >&2; echo "checked_memory: failed: $*" >&2; exit 1; }
 }
 
 if [ "$kind" = memcheck ]; then
@@ -68,9 +68,9 @@ build() { clang $flags "$1.c" "$out/helpers.a" "$library" -lcmocka -lm -lpthread
 
 build seeded_memory_fault
 caught "$out/seeded_memory_fault" overread
-grep -q 'AddressSanitizer: heap-buffer-overflow' "$out/seed.log"
+grep -q 'AddressSanitizer: heap-buffer-overflow' "$out/$kind-seed.log"
 caught "$out/seeded_memory_fault" undefined
-grep -q 'signed integer overflow' "$out/seed.log"
+grep -q 'signed integer overflow' "$out/$kind-seed.log"
 clean "$out/seeded_memory_fault" none
 for test; do
     build "$test"

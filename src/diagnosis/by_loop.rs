@@ -12,7 +12,7 @@ mod itself;
 mod replays;
 mod trial;
 
-pub(super) use replays::{Over, mean, misses, strength};
+pub(super) use replays::{Over, mean, mean_of_worse_half, misses, strength};
 
 use super::belief;
 use super::causes::{ABOUT_REVERSALS, LAWS, Law, law};
@@ -31,12 +31,12 @@ use super::verdict::{Diagnosis, Finding, Verdict, confidence};
 use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::added::ByServo;
-use replays::{NOTHING, Replays, mean_of_worse_half};
+use replays::{NOTHING, Replays};
 use trial::{Refined, Trial, starts};
 
 /// Misses from which on the loop has something to say: half of the blocks are missed, in the geometric mean, by more than twice what the
 /// encoder itself is off by.
-const MUCH: f64 = 0.9;
+pub(super) const MUCH: f64 = 0.9;
 /// Share of the misses beyond that which a cause must explain in rows that gave none of its numbers.
 const LEAST_EXPLAINED: f64 = 0.4;
 /// Mean over scatter of what it gains in each block, times √blocks.

@@ -36,8 +36,51 @@ pub fn left_out(bench: &Bench, kept: &Axis, fit: &Fit) -> Option<Fit> {
         let (effect, deviations) = uncertainty::effects(bench, fit, None).swap_remove(at)?;
         Some((*effect.values().first()?, *deviations.first()?))
     };
-    let (here, sure) = delay(bench, fit, at)?;
-    let (far, unsure) = delay(&on_wide, &there, fit.parts.len() - 1)?;
-    let contradicts = (here - far).abs() > APART * sure.hypot(unsure) && (far / here) < BORNE_OUT;
-    contradicts.then(|| bench.refine(bench.without(fit, at), 0, STEPS))
+    let here = delay(bench, fit, at)?;
+    let far = delay(&on_wide, &there, fit.parts.len() - 1)?;
+    is_contradicted(here, far).then(|| bench.refine(bench.without(fit, at), 0, STEPS))
+}
+
+/// Whether a delay with its deviation is not that of the wider look.
+fn is_contradicted((here, sure): (f64, f64), (far, unsure): (f64, f64)) -> bool {
+    (here - far).abs() > APART * sure.hypot(unsure) && far / here < BORNE_OUT
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::belief::base_alone;
+    use crate::diagnosis::causes::law;
+    use crate::diagnosis::excerpt::Excerpt;
+    use crate::machine::{Effect, Machine};
+    use crate::plant::moves::{Moves, Reach};
+    use crate::plant::simulate::{Sensors, Setup, simulate};
+    use crate::recording::{Column, Recording};
+
+    #[test]
+    fn a_delay_is_borne_out_by_the_same_through_a_wider_low_pass() {
+        assert!(is_contradicted((-1.08, 0.14), (0.07, 0.08)) && is_contradicted((-0.51, 0.14), (-0.03, 0.01)));
+        assert!(!is_contradicted((-3.32, 0.15), (-2.88, 0.09)) && !is_contradicted((0.22, 0.003), (0.1, 0.11)));
+    }
+
+    #[test]
+    fn a_delay_that_is_one_stays_beside_much_noise_of_the_encoder() {
+        let belief = Machine::parse(include_str!("../../examples/machines/believed.json")).unwrap().axes.remove(0);
+        let reach = Reach { start: 20.0, stroke: 200.0, speed: 250.0, acceleration: 2500.0 };
+        let mut command = Moves::built_in("test", &reach).unwrap().command(1e-3);
+        command.truncate(15_000);
+        let sensors = Sensors { grid_um: 1.0, noise_um: 0.3, torque_noise: 0.01, ..Sensors::default() };
+        for delay_ms in [-0.9, 0.4, 1.3] {
+            let truth = belief.with_effects(vec![Effect::DeadTime { delay_ms }]);
+            let trace = simulate(&truth, &command, &Setup { seed: 1, sensors, ..Setup::default() }).unwrap();
+            let columns = vec![Column::new("x.position_mm", trace.position), Column::new("x.torque_nm", trace.torque)];
+            let recording = Recording::from_columns("simulated", trace.time_s, columns).unwrap();
+            let whole = Excerpt::of(&recording, &belief).columns.unwrap();
+            let (base, thinned) = (base_alone(&belief), whole.thinned());
+            let frame = Frame::new(&base, &thinned, None);
+            let bench = Bench::new(&frame, &Known::of(&belief, &frame));
+            let fit = bench.refine(bench.fit(bench.parts(law(Cause::DeadTime), vec![vec![delay_ms]])), 0, STEPS);
+            assert!(left_out(&bench, &belief, &fit).is_none(), "{delay_ms} ms");
+        }
+    }
 }

@@ -31,8 +31,8 @@ const BEAM: usize = 2;
 const TRIED: usize = 6;
 /// Most causes in a set.
 const MOST: usize = 6;
-/// Starts of a law that are laid out in one go; springs are stepped as many side by side.
-const AT_A_TIME: usize = 8;
+/// Starts of a law that are laid out in one go; tables are stepped half as many side by side.
+const AT_A_TIME: usize = 16;
 /// Least gain of a cause in Σ ln(mean square): 8 % of what is left. A smaller one would not be worth a machinist's time,
 /// and imperfect filters, grids and reversals make up to half of it on machines without any fault.
 pub const LEAST_GAIN: f64 = 0.08;

@@ -81,18 +81,20 @@ fn terms_of(frame: &Frame, resistance: &Resistance, splits: &[Option<TwoMasses>]
     let sound: Vec<TwoMasses> = splits.iter().copied().flatten().collect();
     let together = |masses: &[TwoMasses]| match masses {
         [one] => Tables::<1, _>::new(frame, Alike(resistance), std::slice::from_ref(one)).terms(1),
+        few if few.len() <= FEW => Tables::<FEW, _>::new(frame, Alike(resistance), few).terms(few.len()),
         several => Tables::<LANES, _>::new(frame, Alike(resistance), several).terms(several.len()),
     };
-    // As many in each go, which may go at a time.
-    let in_a_go = sound.len().div_ceil(sound.len().div_ceil(LANES).max(1)).max(1);
+    // As many in each go, which may go at a time. Few are shared between cores that may have nothing else to do.
+    let most = if sound.len() > LANES { LANES } else { FEW };
+    let in_a_go = sound.len().div_ceil(sound.len().div_ceil(most).max(1)).max(1);
     let mut found = sound.par_chunks(in_a_go).flat_map_iter(together).collect::<Vec<_>>().into_iter();
     splits.iter().map(|split| split.and_then(|_| found.next()).unwrap_or_default()).collect()
 }
 
 /// Tables that are simulated side by side: each step waits for the one before it, so that several cost little more than one.
 /// A table by itself is simulated by itself.
-const LANES: usize = 4;
-/// The same under resistances of their own, which a row has to fetch for each.
+const LANES: usize = 8;
+/// The same of few, and under resistances of their own, which a row has to fetch for each.
 const FEW: usize = 4;
 /// Radians of the fastest swing to a step: of a spring, whose swing is all that there is, and of flanks.
 const STEP_RAD: [f64; 2] = [0.12, 0.35];
