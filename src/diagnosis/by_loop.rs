@@ -39,6 +39,8 @@ use trial::{Refined, Trial, starts};
 pub(super) const MUCH: f64 = 0.9;
 /// Share of the misses beyond that which a cause must explain in rows that gave none of its numbers.
 const LEAST_EXPLAINED: f64 = 0.4;
+/// The same where the torque is left with much that no cause explains.
+const MOSTLY: f64 = 0.6;
 /// Mean over scatter of what it gains in each block, times √blocks.
 const SURELY: f64 = 3.0;
 /// Share of the best cause's gain from which on another one is not told from it, and may itself be the one.
@@ -52,9 +54,6 @@ const TRIED: usize = 3;
 /// The halves that give a cause its numbers and that judge it.
 const GIVES: Over = Over::Half(0);
 const JUDGES: Over = Over::Half(1);
-
-/// The same where the torque is left with much that no cause explains.
-const MOSTLY: f64 = 0.6;
 
 const STAGE: &str = "asking the closed loop";
 
@@ -158,6 +157,7 @@ fn told(
     let refined = watch.each(&best, (0.99, 0.995), STAGE, |trial| refine(trial.clone()))?;
     let mut refined: Vec<(f64, Vec<f64>, Refined)> = refined.into_iter().flatten().collect();
     refined.sort_by(|a, b| b.0.total_cmp(&a.0));
+    // A clearance may be found where a spring was meant, whose starts end below what rows show.
     let spring = refined.first().and_then(|(gain, _, best)| Some((*gain, best.trial.as_spring(frame, extended)?)));
     if let Some((gain, spring)) = spring.and_then(|(gain, spring)| Some((gain, refine(spring)?))) {
         refined.retain(|(.., other)| other.trial.law.cause != Cause::DriveCompliance || spring.0 < ALIKE * gain);
