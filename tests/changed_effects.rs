@@ -1,6 +1,6 @@
 //! What is believed and has changed: found with its new numbers, in the place of the old.
 
-use gib::diagnosis::Verdict;
+use gib::diagnosis::{Excerpt, Verdict, diagnose};
 use gib::machine::{Cause, Effect};
 use rig::{good, judged, named, recorded, recorded_by, rig, test_moves};
 
@@ -93,4 +93,16 @@ fn a_ripple_of_another_size_takes_the_place_of_the_believed_one() {
         };
         assert!((found / amplitude - 1.0).abs() < 0.03 && (period_mm / 2.5 - 1.0).abs() < 1e-3, "{amplitude}: {found}");
     }
+}
+
+/// The recording leaves what the machine's own would, and says nothing of what the hold-out shows.
+#[test]
+fn what_acts_on_a_hold_out_alone_is_not_taken_for_what_the_encoder_makes() {
+    let believed = rig(&[]);
+    let clean = recorded(&believed, &test_moves(), 3);
+    let other = recorded(&rig(&[Effect::CoulombFrictionMismatch { torque: 1.6 }]), &test_moves(), 4);
+    let excerpt = |recording| Excerpt::of(recording, &believed);
+    let d = diagnose(&believed, &excerpt(&clean), Some(&excerpt(&other)), &|_, _| true).unwrap();
+    assert_eq!(d.verdict, Verdict::UnknownCause, "{:?}", d.notes);
+    assert_eq!(judged(&believed, &clean).verdict, Verdict::NoDiscrepancy);
 }

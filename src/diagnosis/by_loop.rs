@@ -12,6 +12,7 @@ mod itself;
 mod replays;
 mod trial;
 
+pub(super) use itself::settled;
 pub(super) use replays::{Over, mean, mean_of_worse_half, misses, strength};
 
 use super::belief;
@@ -68,7 +69,6 @@ pub fn completed(
     found: Diagnosis,
     watch: &Watch,
 ) -> Result<Diagnosis, Stopped> {
-    let found = itself::settled(found, whole, frame, watch);
     let about = |effect: &Effect| ABOUT_REVERSALS.contains(&effect.cause());
     // One that the torque names may stand in for another, and gives way to that. Where more of these are there the loop misses by what
     // their numbers are off by, for which another stands in.

@@ -152,7 +152,7 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
             }
         }
     }
-    let (mut frame, mut heard) = (first.clone(), None);
+    let (mut frame, mut heard, mut by_first) = (first.clone(), None, true);
     for _ in 0..quiet::MOST {
         if !matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained | Verdict::UnknownCause) {
             break;
@@ -164,15 +164,17 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
         }
         let again = answer(&recorded, &wide, notes.clone())?;
         if quiet::finds_more(axis, &again, &found) {
-            found = again;
+            (found, by_first) = (again, false);
         } else if found.verdict == Verdict::NoDiscrepancy {
             match heard.take().filter(|before| quiet::agree(axis, before, &again)) {
-                Some(before) => found = before,
+                Some(before) => (found, by_first) = (before, false),
                 None => heard = Some(again),
             }
         }
         frame = wide;
     }
+    // What a quieter look has heard the first does not judge.
+    let found = if by_first { by_loop::settled(found, whole, &first, watch) } else { found };
     let found = by_loop::completed(axis, (whole, holdout), &first, found, watch)?;
     watch.at(1.0, "done").map(|()| found)
 }

@@ -8,6 +8,7 @@ use super::replays::Replays;
 use crate::diagnosis::belief;
 use crate::diagnosis::fit::Bench;
 use crate::diagnosis::frame::{Columns, Frame};
+use crate::diagnosis::judge::{Excess, LITTLE_LEFT};
 use crate::diagnosis::known::Known;
 use crate::diagnosis::progress::Watch;
 use crate::diagnosis::verdict::{Diagnosis, Verdict};
@@ -43,16 +44,16 @@ pub fn is_as_much(replays: &Replays, (frame, whole): (&Frame, &Columns), machine
     Some(squares < AS_MUCH * (swings + noise))
 }
 
-/// An answer that doubts a machine, or leaves something beside what was found, by no more than that.
+/// An answer by the look of a frame that doubts a machine, or leaves something beside what was found, by no more than that.
 pub fn settled(mut found: Diagnosis, whole: &Columns, frame: &Frame, watch: &Watch) -> Diagnosis {
     let doubts = match found.verdict {
         Verdict::UnknownCause => true,
         Verdict::PartlyExplained => belief::parts_table(&found.extended),
         _ => false,
     };
-    let Some(known) = found.replay.as_ref().filter(|_| doubts) else {
-        return found;
-    };
+    // What only a hold-out shows is not to be seen here.
+    let doubts = doubts && Excess::of_machine(&found.extended, frame).largest() > LITTLE_LEFT;
+    let Some(known) = found.replay.as_ref().filter(|_| doubts) else { return found };
     let Some(observed) = whole.observed() else { return found };
     let servo = ByServo::of(&found.extended, &observed);
     let replays = Replays::new((&observed, &servo), known, watch);
