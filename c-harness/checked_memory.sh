@@ -3,6 +3,7 @@
 #
 #   checked_memory.sh sanitizers TEST...     names of test programs, without .c; HELPERS: names of what they share
 #   checked_memory.sh memcheck PROGRAM...    programs that are built already
+#   checked_memory.sh sanitized TEST         one test of the first, which calls itself so, several at a time
 #
 # A fault put in on purpose must be caught first; then the programs must be clean. A tool that is not here is named.
 set -eu
@@ -25,7 +26,8 @@ caught() {
 
 # clean COMMAND...: it must not fail; what it says is shown when it does
 clean() {
-    "$@" >"$out/$kind.log" 2>&1 || { tail -n 40 "$out/$kind.log" >&2; echo "checked_memory: failed: $*" >&2; exit 1; }
+    log=$out/$kind-$(basename "$1").log
+    "$@" >"$log" 2>&1 || { tail -n 40 "$log" >&2; echo "checked_memory: failed: $*" >&2; exit 1; }
 }
 
 if [ "$kind" = memcheck ]; then
@@ -42,29 +44,36 @@ if [ "$kind" = memcheck ]; then
     exit 0
 fi
 
-command -v clang >/dev/null || skip "no clang"
 target=x86_64-unknown-linux-gnu
-[ "$(uname -sm)" = "Linux x86_64" ] || skip "set up for Linux on x86_64 only"
 flags="-std=c11 -D_GNU_SOURCE -O1 -g -I../include -fsanitize=address,undefined -fno-sanitize-recover=all"
+library=$root/build/asan/$target/release/libgib.a
+build() { clang $flags "$1.c" "$out/helpers.a" "$library" -lcmocka -lm -lpthread -ldl -o "$out/$1"; }
+if [ "$kind" = sanitized ]; then
+    build "$1"
+    clean "$out/$1"
+    echo "sanitizers: $1 clean"
+    exit 0
+fi
+
+command -v clang >/dev/null || skip "no clang"
+[ "$(uname -sm)" = "Linux x86_64" ] || skip "set up for Linux on x86_64 only"
 echo 'int main(void) { return 0; }' >"$out/empty.c"
 clang $flags "$out/empty.c" -o "$out/empty" 2>/dev/null || skip "clang has no sanitizers (libclang-rt-dev)"
 
 # Only the library, and only what changed since the last time. The switch is for compilers of developers, hence the
 # variable that says so; a compiler that still refuses it is named.
 if ! RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=address -Cdebug-assertions=on -Coverflow-checks=on" \
-    CARGO_TARGET_DIR="$root/build/asan" ${CARGO:-cargo} build -q --manifest-path "$root/Cargo.toml" --lib --release \
-    --target $target 2>"$out/cargo.log"; then
+    CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 CARGO_TARGET_DIR="$root/build/asan" ${CARGO:-cargo} build -q \
+    --manifest-path "$root/Cargo.toml" --lib --release --target $target 2>"$out/cargo.log"; then
     grep -q 'sanitizer' "$out/cargo.log" && skip "the Rust compiler has no sanitizers"
     cat "$out/cargo.log" >&2
     exit 1
 fi
-library=$root/build/asan/$target/release/libgib.a
 rm -f "$out/helpers.a"
 for helper in $HELPERS; do
     clang $flags -c "$helper.c" -o "$out/$helper.o"
     ar rcs "$out/helpers.a" "$out/$helper.o"
 done
-build() { clang $flags "$1.c" "$out/helpers.a" "$library" -lcmocka -lm -lpthread -ldl -o "$out/$1"; }
 
 build seeded_memory_fault
 caught "$out/seeded_memory_fault" overread
@@ -72,8 +81,4 @@ grep -q 'AddressSanitizer: heap-buffer-overflow' "$out/$kind-seed.log"
 caught "$out/seeded_memory_fault" undefined
 grep -q 'signed integer overflow' "$out/$kind-seed.log"
 clean "$out/seeded_memory_fault" none
-for test; do
-    build "$test"
-    clean "$out/$test"
-    echo "sanitizers: $test clean"
-done
+printf '%s\n' "$@" | xargs -n 1 -P "$(nproc)" "./$(basename "$0")" sanitized

@@ -1,13 +1,7 @@
 //! What acts in a few rows about each reversal is found by torque and closed loop together, down to some ten steps of the encoder; a servo
 //! that is another one than is believed is not taken for a cause of the vocabulary.
 
-#[path = "../examples/scoreboard/board/mod.rs"]
-#[allow(dead_code)]
-mod board;
-#[path = "common/generated.rs"]
-mod generated;
-
-use generated::{Coupling, Rig, ServoGains, Truth, rig, said};
+use crate::generated::{Coupling, Rig, ServoGains, Truth, rig, said};
 use std::f64::consts::TAU;
 
 /// A rig with much friction, a fine encoder and a servo that takes its time.

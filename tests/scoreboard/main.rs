@@ -1,9 +1,14 @@
 //! The laws of the generator that hides effects, and a small scoreboard of the diagnosis: a fixed part, whose cases never
-//! change, and a fresh part, whose seed is printed. The whole board is `cargo run --release --example scoreboard`.
+//! change, and a fresh part, whose seed is printed; and single rigs of the same generator on which a law of the diagnosis shows. The
+//! whole board is `cargo run --release --example scoreboard`.
 
-#[path = "../examples/scoreboard/board/mod.rs"]
+#[path = "../../examples/scoreboard/board/mod.rs"]
 #[allow(dead_code)]
 mod board;
+mod by_loop;
+mod coarse_encoder;
+mod generated;
+mod quiet;
 
 use board::case::{Case, Kind, LEAST};
 use board::effects::CAUSES;

@@ -1,13 +1,7 @@
 //! What a servo makes of a coarse encoder's noise hides what is slow: a quieter look finds it, and finds nothing where nothing is.
 
-#[path = "../examples/scoreboard/board/mod.rs"]
-#[allow(dead_code)]
-mod board;
-#[path = "common/generated.rs"]
-mod generated;
-
-use board::outside::{Kind, Outside};
-use generated::{Rig, Truth, rig, said};
+use crate::board::outside::{Kind, Outside};
+use crate::generated::{Rig, Truth, rig, said};
 
 /// Each is a thousandth of what the belief has, or of its friction: one look alone says that there is no discrepancy.
 #[test]

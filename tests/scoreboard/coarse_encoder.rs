@@ -2,14 +2,7 @@
 //! and a simulated table swings by the grid alone. Such a spring is found all the same, and one that is believed is not doubted for its
 //! swing.
 
-#[path = "../examples/scoreboard/board/mod.rs"]
-#[allow(dead_code)]
-mod board;
-#[path = "common/generated.rs"]
-#[allow(dead_code)]
-mod generated;
-
-use generated::{Coupling, Rig, ServoGains, Truth, rig, said, said_believing};
+use crate::generated::{Coupling, Rig, ServoGains, Truth, rig, said, said_believing};
 use serde_json::json;
 use std::f64::consts::TAU;
 
