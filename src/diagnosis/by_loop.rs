@@ -32,6 +32,7 @@ use super::verdict::{Diagnosis, Finding, Verdict, confidence};
 use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::added::ByServo;
+use itself::Itself;
 use replays::{NOTHING, Replays};
 use trial::{Refined, Trial, starts};
 
@@ -251,7 +252,7 @@ fn by_torque((frame, whole): (&Frame, &Columns), replays: &Replays, [before, wit
     if after <= LITTLE_LEFT || after <= TOLERABLE_EXCESS && after <= before {
         return Some(Verdict::Explained);
     }
-    if itself::is_as_much(replays, (frame, whole), with) == Some(true) {
+    if Itself::of(replays, whole, with).is_some_and(|itself| itself.leaves_as_much(frame)) {
         return Some(Verdict::Explained);
     }
     (after <= before).then_some(Verdict::PartlyExplained)
