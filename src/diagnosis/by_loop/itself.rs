@@ -120,6 +120,7 @@ pub fn settled(mut found: Diagnosis, whole: &Columns, frame: &Frame, watch: &Wat
         Some((coordinate, share)) if !doubts => {
             let (name, percent) = (coordinate.name(), 100.0 * share);
             found.verdict = Verdict::UnknownCause;
+            found.unexplained.torque.describes = format!("hides in the encoder's noise what goes with {name}");
             found.notes.push(format!("a quieter look shows what the encoder's noise hides: {percent:.0} % of the variance that is left goes with {name}, more than of a recording of this very machine"));
         }
         None if doubts => {
