@@ -40,10 +40,7 @@ demo: build ## show what gib does
 	@test ! -e c-harness/Makefile || $(MAKE) -s -C c-harness all
 	@GIB=$(RELEASE)/gib tools/demo
 
-# The release is built by one core; the lints, in a folder of their own, have the other.
-test: deps check-format ## everything that must hold
-	@$(MAKE) --no-print-directory -j 2 build check-lints
-	@$(MAKE) --no-print-directory test-rust test-harness linuxcnc-test
+test: deps check-format build check-lints test-rust test-harness linuxcnc-test ## everything that must hold
 	@echo "make test: all passed"
 
 deps: ## install the Debian packages that the tests need

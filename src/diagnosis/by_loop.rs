@@ -252,7 +252,7 @@ fn by_torque((frame, whole): (&Frame, &Columns), replays: &Replays, [before, wit
     if after <= LITTLE_LEFT || after <= TOLERABLE_EXCESS && after <= before {
         return Some(Verdict::Explained);
     }
-    if Itself::of(replays, whole, with).is_some_and(|itself| itself.leaves_as_much(frame)) {
+    if Itself::of(replays, whole, with).leaves_as_much(frame) {
         return Some(Verdict::Explained);
     }
     (after <= before).then_some(Verdict::PartlyExplained)

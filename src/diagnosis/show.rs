@@ -132,16 +132,16 @@ pub fn share_along(bench: &Bench, fit: &Fit, coordinate: Coordinate) -> f64 {
     share_of(bench.frame, &rest, coordinate)
 }
 
-/// Standard deviation of a share of values that go with nothing, of so many rows.
-#[must_use]
-pub fn chance(rows: f64) -> f64 {
-    (2.0 * (GROUPS - 1) as f64).sqrt() / rows
-}
-
 /// The same of values at the judged rows.
 #[must_use]
 pub fn share_of(frame: &Frame, values: &[f64], coordinate: Coordinate) -> f64 {
     Groups::of(&places(frame, coordinate), values).share()
+}
+
+/// Standard deviation of a share of values that go with nothing, of so many rows.
+#[must_use]
+pub fn chance(rows: f64) -> f64 {
+    (2.0 * (GROUPS - 1) as f64).sqrt() / rows
 }
 
 /// Share that goes with the acceleration as far as the encoder's noise is not in that: the balance has the noise as acceleration, with

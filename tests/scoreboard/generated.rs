@@ -5,7 +5,6 @@ use crate::board::random::Random;
 use crate::board::record;
 pub use crate::board::rig::{Drive, Rig, ServoGains};
 use crate::board::rough::Rough;
-#[allow(unused_imports)] // some tests name no coupling
 pub use crate::board::truth::{Coupling, Truth};
 use serde_json::Value;
 

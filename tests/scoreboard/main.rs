@@ -16,7 +16,7 @@ use board::moves::Command;
 use board::outside;
 use board::random::Random;
 use board::record;
-use board::rig::{Drive, Rig, ServoGains};
+use board::rig::{Rig, ServoGains};
 use board::score::{self, Score};
 use board::table::summarise;
 use board::truth::Truth;
@@ -79,31 +79,11 @@ fn the_servo_and_machine_are_those_of_the_sample_recording() {
     let rows: Vec<Vec<f64>> =
         (reader.records()).map(|r| r.unwrap().iter().map(|v| v.parse().unwrap()).collect()).collect();
     // rig-clean/machine.json, by hand.
-    let (period, lead) = (1e-3, 10.0);
-    let servo = ServoGains {
-        period,
-        position_gain: 40.0,
-        velocity_gain: 0.5277875658030852,
-        integral_time: Some(0.02),
-        feedforward: 1.0,
-        lag: 5e-4,
-        two_sample_mean: false,
-    };
-    let rig = Rig {
-        drive: Drive::BallScrew,
-        unit: lead / std::f64::consts::TAU,
-        inertia: 0.0028,
-        coulomb: 0.9,
-        viscous: 0.008,
-        constant: 0.0,
-        limit: 16.0,
-        servo,
-        encoder_step: 1e-4,
-        torque_noise: 0.0,
-        torque_step: 0.0,
-        table: None,
-        ..Rig::draw(&mut Random::new(1, 1), 10.0)
-    };
+    let like = generated::rig();
+    let servo =
+        ServoGains { position_gain: 40.0, velocity_gain: 0.5277875658030852, integral_time: Some(0.02), ..like.servo };
+    let rig = Rig { servo, encoder_step: 1e-4, torque_noise: 0.0, ..like };
+    let period = servo.period;
     let position: Vec<f64> = rows.iter().map(|r| r[1]).collect();
     let near = |i: usize| position[i.min(position.len() - 1)];
     let speed = (0..position.len()).map(|i| (near(i + 1) - near(i.saturating_sub(1))) / (2.0 * period)).collect();

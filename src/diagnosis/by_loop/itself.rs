@@ -55,42 +55,72 @@ impl Leaves {
     }
 }
 
-/// A machine beside recordings of its own.
+/// A machine beside recordings of its own, which are simulated when first asked for.
 pub struct Itself<'i> {
+    replays: &'i Replays<'i>,
     whole: &'i Columns,
     machine: &'i Axis,
     base: Axis,
-    own: Vec<[Vec<f64>; 2]>,
+    own: OnceCell<Vec<Columns>>,
 }
 
 impl<'i> Itself<'i> {
-    /// Of a machine and the recording; `None` where none of its own is to be had.
+    /// Of a machine and the recording.
     #[must_use]
-    pub fn of(replays: &Replays, whole: &'i Columns, machine: &'i Axis) -> Option<Self> {
-        let own: Vec<[Vec<f64>; 2]> = replays.recordings_of(machine).collect();
-        (!own.is_empty()).then(|| Self { whole, machine, base: belief::base_alone(machine), own })
+    pub fn of(replays: &'i Replays<'i>, whole: &'i Columns, machine: &'i Axis) -> Self {
+        Self { replays, whole, machine, base: belief::base_alone(machine), own: OnceCell::new() }
     }
 
-    /// What the machine leaves of its own recordings through the low-pass of a frame, the most of each.
+    /// What the machine leaves of its own recordings through the low-pass of a frame, the most of each; `None` where none is to be had.
     fn leaves(&self, frame: &Frame) -> Option<Leaves> {
-        let of = |[position, torque]: &[Vec<f64>; 2]| {
-            let columns = self.whole.with_motion(position.clone(), torque.clone()).thinned();
-            Leaves::of(self.machine, &Frame::new(&self.base, &columns, Some(frame.low_pass.width)))
-        };
+        let thinned = |[position, torque]: [Vec<f64>; 2]| self.whole.with_motion(position, torque).thinned();
+        let own = self.own.get_or_init(|| self.replays.recordings_of(self.machine).map(thinned).collect());
+        let of = |columns| Leaves::of(self.machine, &Frame::new(&self.base, columns, Some(frame.low_pass.width)));
         let more = |a: Leaves, b: Leaves| Leaves {
             squares: a.squares.max(b.squares),
             goes_with: std::array::from_fn(|at| a.goes_with[at].max(b.goes_with[at])),
             ..a
         };
-        self.own.iter().map(of).reduce(more)
+        own.iter().map(of).reduce(more)
     }
 
     /// Whether the machine leaves no more of a frame than of recordings of its own. A scale tells more of a table than they do.
     #[must_use]
     pub fn leaves_as_much(&self, frame: &Frame) -> bool {
+        if self.whole.table.is_some() {
+            return false;
+        }
         let measured = Leaves::of(self.machine, &frame.believing(&self.base));
-        let own = self.leaves(frame).filter(|_| self.whole.table.is_none());
-        own.is_some_and(|own| measured.squares < AS_MUCH * (own.squares + measured.noise))
+        self.leaves(frame).is_some_and(|own| measured.squares < AS_MUCH * (own.squares + measured.noise))
+    }
+
+    /// With what more goes than of recordings of its own, and the share of the variance that does, of the quietest look that shows it.
+    fn lives_in(&self, frame: &Frame) -> Option<(Coordinate, f64)> {
+        let masses = self.machine.two_masses().ok()?;
+        let columns = self.whole.clone().thinned();
+        let mut look = frame.believing(&self.base);
+        let mut shown = None;
+        for turn in 0..LOOKS {
+            if turn > 0 {
+                let wide = Frame::new(&self.base, &columns, Some(quiet::wider(&look)));
+                look = masses.iter().fold(wide, Frame::after_first_swings);
+                if !what_is_missing(&look).is_empty() {
+                    break;
+                }
+            }
+            let measured = Leaves::of(self.machine, &look);
+            let least = LITTLE_LEFT * measured.noise + SURE * show::chance(measured.rows) * measured.squares;
+            // Recordings of its own are simulated only where that may matter.
+            if measured.goes_with.iter().any(|variance| *variance > least) {
+                let own = self.leaves(&look)?;
+                let more = |at: usize| measured.goes_with[at] - own.goes_with[at];
+                let at = usize::from(more(1) > more(0));
+                if more(at) > least {
+                    shown = Some((WHERE[at], measured.goes_with[at] / measured.squares));
+                }
+            }
+        }
+        shown
     }
 }
 
@@ -98,25 +128,24 @@ impl<'i> Itself<'i> {
 /// its own would is put right, and one that finds nothing where more than that goes with a place or a time.
 pub fn settled(mut found: Diagnosis, whole: &Columns, frame: &Frame, watch: &Watch) -> Diagnosis {
     let doubts = match found.verdict {
+        Verdict::NoDiscrepancy => false,
         Verdict::UnknownCause => true,
-        Verdict::PartlyExplained => belief::parts_table(&found.extended),
-        _ => false,
+        Verdict::PartlyExplained if belief::parts_table(&found.extended) => true,
+        _ => return found,
     };
     // What only a hold-out shows is not to be seen here.
-    let doubts = doubts && Excess::of_machine(&found.extended, frame).largest() > LITTLE_LEFT;
-    if !doubts && found.verdict != Verdict::NoDiscrepancy {
+    if doubts && Excess::of_machine(&found.extended, frame).largest() <= LITTLE_LEFT {
         return found;
     }
     let Some(known) = &found.replay else { return found };
     let Some(observed) = whole.observed() else { return found };
     let servo = ByServo::of(&found.extended, &observed);
     let Some(replays) = Replays::new((&observed, &servo), known, watch) else { return found };
-    let itself = OnceCell::new();
-    let own = || itself.get_or_init(|| Itself::of(&replays, whole, &found.extended)).as_ref();
-    if doubts && !own().is_some_and(|itself| itself.leaves_as_much(frame)) {
+    let itself = Itself::of(&replays, whole, &found.extended);
+    if doubts && !itself.leaves_as_much(frame) {
         return found;
     }
-    match lives_in(&found.extended, whole, frame, own) {
+    match itself.lives_in(frame) {
         Some((coordinate, share)) if !doubts => {
             let (name, percent) = (coordinate.name(), 100.0 * share);
             found.verdict = Verdict::UnknownCause;
@@ -131,37 +160,4 @@ pub fn settled(mut found: Diagnosis, whole: &Columns, frame: &Frame, watch: &Wat
         _ => (),
     }
     found
-}
-
-/// With what more goes than of recordings of a machine itself, and the share of the variance that does, of the quietest look that shows it.
-fn lives_in<'i>(
-    machine: &Axis,
-    whole: &Columns,
-    frame: &Frame,
-    own: impl Fn() -> Option<&'i Itself<'i>>,
-) -> Option<(Coordinate, f64)> {
-    let base = belief::base_alone(machine);
-    let columns = whole.clone().thinned();
-    let masses = machine.two_masses().ok()?;
-    let mut width = frame.low_pass.width;
-    let mut shown = None;
-    for _ in 0..LOOKS {
-        let look = masses.iter().fold(Frame::new(&base, &columns, Some(width)), Frame::after_first_swings);
-        if !what_is_missing(&look).is_empty() {
-            break;
-        }
-        let measured = Leaves::of(machine, &look);
-        let least = LITTLE_LEFT * measured.noise + SURE * show::chance(measured.rows) * measured.squares;
-        // Recordings of its own are simulated only where that may matter.
-        if measured.goes_with.iter().any(|variance| *variance > least) {
-            let own = own()?.leaves(&look)?;
-            let more = |at: usize| measured.goes_with[at] - own.goes_with[at];
-            let at = usize::from(more(1) > more(0));
-            if more(at) > least {
-                shown = Some((WHERE[at], measured.goes_with[at] / measured.squares));
-            }
-        }
-        width = quiet::wider(&look);
-    }
-    shown
 }
