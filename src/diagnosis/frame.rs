@@ -16,6 +16,7 @@ use super::grids;
 use super::many::{decay, to_the_power, weighted_sums, widest};
 use super::rows::{beside_filled, direction_of, doubtful_rows, judged_rows, resting_rows};
 use super::sampling::{NUMEROV, Sampling};
+use crate::analysis::statistics;
 use crate::machine::{Axis, Belief, Effect};
 use crate::plant::between::{cubic_at, flattened_at};
 use crate::plant::lateness::Lateness;
@@ -55,6 +56,8 @@ pub struct Columns {
 
 /// Rows of less weight are not judged: nothing is known of their friction.
 const LEAST_WEIGHT: f64 = 0.05;
+/// Share of a judged row's noise up to which the torque that friction may take at rest is not missed.
+const NOTHING_AT_REST: f64 = 0.1;
 /// Share of the top speed at which an axis creeps: what dry friction does there depends on the formulation (a step, bristles,
 /// a steep slope), and no feed is so slow.
 const CREEPING: f64 = 1e-3;
@@ -139,11 +142,11 @@ impl<'a> Frame<'a> {
         let stretches = &columns.stretches;
         let h = columns.period_s;
         let grid = columns.position_grid / columns.rows_in_one();
-        let scatter = crate::analysis::statistics::white_noise(&columns.position).unwrap_or(0.0);
+        let scatter = statistics::white_noise(&columns.position).unwrap_or(0.0);
         let position_noise = (grid / 12f64.sqrt()).max(scatter);
         // Torque on a coarse grid may stand still for most rows, and seems to have no noise at all.
-        let torque_grid = crate::analysis::statistics::grid(&columns.torque).unwrap_or(0.0).max(columns.torque_step);
-        let scatter_of_torque = crate::analysis::statistics::white_noise(&columns.torque).unwrap_or(0.0);
+        let torque_grid = statistics::grid(&columns.torque).unwrap_or(0.0).max(columns.torque_step);
+        let scatter_of_torque = statistics::white_noise(&columns.torque).unwrap_or(0.0);
         let torque_noise = scatter_of_torque.max(torque_grid / 12f64.sqrt());
         let bend_noise = position_noise * unit * belief.inertia / (h * h);
         let low_pass = width.map_or_else(|| LowPass::fitting(bend_noise, torque_noise), |width| LowPass { width });
@@ -183,7 +186,9 @@ impl<'a> Frame<'a> {
         // Room for the filter and for reading between rows.
         let margin = low_pass.reach() + 5;
         let filled = beside_filled(columns, margin);
-        let carries = |row: usize| !filled[row] && weight_of(row) > LEAST_WEIGHT;
+        // A rest goes on for many rows, all off by the same: no weight makes them as many that say something.
+        let rests = |row: usize| level > NOTHING_AT_REST * kernel_norm && doubt[row] > 0.5;
+        let carries = |row: usize| !filled[row] && weight_of(row) > LEAST_WEIGHT && !rests(row);
         let kept = judged_rows(columns, margin, low_pass.width / 2 + 1, carries);
         let mut weights: Vec<f64> = kept.iter().map(|&row| weight_of(row)).collect();
         let mean = (weights.iter().map(|w| w * w).sum::<f64>() / weights.len().max(1) as f64).sqrt();
@@ -436,7 +441,7 @@ fn beyond_noise(values: &[f64]) -> Vec<f64> {
         _ => 0.0,
     };
     let bends: Vec<f64> = (0..values.len()).map(bend).collect();
-    let noise = 4.0 * 1.4826 * crate::analysis::statistics::median(&bends).unwrap_or(0.0);
+    let noise = 4.0 * 1.4826 * statistics::median(&bends).unwrap_or(0.0);
     bends.into_iter().map(|bend| (bend - noise).max(0.0)).collect()
 }
 

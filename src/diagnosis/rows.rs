@@ -19,12 +19,11 @@ pub fn resting_rows(columns: &Columns, resolution: f64) -> Vec<bool> {
             if ends {
                 let end = if still { i + 1 } else { i };
                 if end >= run + 3 {
-                    let net = (x[end - 1] - x[run]).abs();
+                    // A slow way there and back ends where it began.
+                    let stays = extent(&x[run..end]) < 3.0 * resolution;
                     for r in run..end {
                         let around = &x[r.saturating_sub(6).max(s.start)..(r + 7).min(s.end)];
-                        let low = around.iter().copied().fold(f64::MAX, f64::min);
-                        let high = around.iter().copied().fold(f64::MIN, f64::max);
-                        resting[r] = net < 3.0 * resolution || high - low < 3.0 * resolution;
+                        resting[r] = stays || extent(around) < 3.0 * resolution;
                     }
                 }
                 run = i + 1;
@@ -32,6 +31,12 @@ pub fn resting_rows(columns: &Columns, resolution: f64) -> Vec<bool> {
         }
     }
     resting
+}
+
+/// How far positions are apart.
+fn extent(positions: &[f64]) -> f64 {
+    let (low, high) = positions.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(*x), high.max(*x)));
+    high - low
 }
 
 /// Mean sign of the speed over each row. Through a fast reversal the crossing is found between rows from speed and

@@ -51,8 +51,6 @@ pub fn said_believing(
     seed: u64,
     change: impl Fn(&mut Truth),
 ) -> (String, Vec<(String, f64)>) {
-    let mut truth = Truth::of(rig);
-    change(&mut truth);
     let mut random = Random::new(seed, 7);
     let mut segments = Vec::new();
     for (to, speed) in
@@ -61,7 +59,39 @@ pub fn said_believing(
         segments.push(Segment::Move { to: to + random.uniform(-5.0, 5.0), speed, acceleration: 2500.0 });
         segments.push(Segment::Dwell { time: 0.1 });
     }
-    let command = moves::sample(10.0, &segments, rig.servo.period, 30.0, 0.02);
+    said_along((segments, 30.0), effects, [believed, rig], random, change)
+}
+
+/// What is said by slow ways there and back about one place, with a rest after each, and two fast ones.
+pub fn said_of_slow_ways(
+    [believed, rig]: [&Rig; 2],
+    seed: u64,
+    change: impl Fn(&mut Truth),
+) -> (String, Vec<(String, f64)>) {
+    let mut random = Random::new(seed, 8);
+    let mut segments = Vec::new();
+    for (way, speed) in
+        [(20.0, 120.0), (0.5, 0.5), (0.5, 0.5), (0.6, 1.2), (0.9, 1.2), (1.5, 3.0), (5.0, 8.0), (8.0, 25.0)]
+    {
+        for to in [60.0 + way, 60.0 - way] {
+            segments.push(Segment::Move { to: to + random.uniform(-0.05, 0.05), speed, acceleration: 1000.0 });
+            segments.push(Segment::Dwell { time: 0.4 });
+        }
+    }
+    said_along((segments, 40.0), Vec::new(), [believed, rig], random, change)
+}
+
+/// What is said after segments, cut off at a time, s.
+fn said_along(
+    (segments, time): (Vec<Segment>, f64),
+    effects: Vec<Value>,
+    [believed, rig]: [&Rig; 2],
+    mut random: Random,
+    change: impl Fn(&mut Truth),
+) -> (String, Vec<(String, f64)>) {
+    let mut truth = Truth::of(rig);
+    change(&mut truth);
+    let command = moves::sample(10.0, &segments, rig.servo.period, time, 0.02);
     let run = record::run(rig, &truth, &command, 1e-5, &mut random);
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
