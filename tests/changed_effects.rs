@@ -95,6 +95,33 @@ fn a_ripple_of_another_size_takes_the_place_of_the_believed_one() {
     }
 }
 
+/// What a tight spot of the belief leaves is no spot beside it, as long as it is in the same place: that is one of another height. One
+/// that is elsewhere joins it.
+#[test]
+fn a_tight_spot_of_another_height_takes_the_place_of_the_believed_one() {
+    let spot = |peak, centre_mm| Effect::PositionDependentFriction { centre_mm, peak, width_mm: 15.0, steepness: 2.0 };
+    for (seed, peak) in [(8, 0.45), (9, 0.12), (10, -0.2)] {
+        let d = judged(&rig(&[spot(0.25, 90.0)]), &recorded(&rig(&[spot(peak, 90.0)]), &test_moves(), seed));
+        let [Effect::PositionDependentFriction { centre_mm, peak: found, .. }] = d.extended.effects[..] else {
+            panic!("{peak}: {:?} {:?}", d.extended.effects, d.notes)
+        };
+        assert!((found / peak - 1.0).abs() < 0.05 && (centre_mm - 90.0).abs() < 1.5, "{peak}: {found} at {centre_mm}");
+    }
+    let both = [spot(0.25, 60.0), spot(0.3, 130.0)];
+    let d = judged(&rig(&both[..1]), &recorded(&rig(&both), &test_moves(), 11));
+    let [
+        Effect::PositionDependentFriction { peak: kept, .. },
+        Effect::PositionDependentFriction { peak, centre_mm, .. },
+    ] = d.extended.effects[..]
+    else {
+        panic!("{:?} {:?}", d.extended.effects, d.notes)
+    };
+    assert!(
+        kept == 0.25 && (peak / 0.3 - 1.0).abs() < 0.05 && (centre_mm - 130.0).abs() < 1.5,
+        "{peak} at {centre_mm}"
+    );
+}
+
 /// The recording leaves what the machine's own would, and says nothing of what the hold-out shows.
 #[test]
 fn what_acts_on_a_hold_out_alone_is_not_taken_for_what_the_encoder_makes() {

@@ -9,6 +9,7 @@ mod by_loop;
 mod coarse_encoder;
 mod generated;
 mod quiet;
+mod worm;
 
 use board::case::{Case, Kind, LEAST};
 use board::effects::CAUSES;

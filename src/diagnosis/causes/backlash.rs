@@ -6,6 +6,11 @@
 
 use super::*;
 
+/// Least width that is looked for, load units, and of a motor whose turn moves the load by little as a share of its turn: a rotary table
+/// behind a worm has a clearance of less than a thousandth of a degree.
+const LEAST: f64 = 2e-3;
+const LEAST_TURN: f64 = 2e-4;
+
 /// Parameters: full width in µm, shares of inertia and friction on the table's side, how stiff the flanks meet
 /// in Hz. The trace has no coefficient.
 pub static LAW: Law = Law {
@@ -18,7 +23,8 @@ pub static LAW: Law = Law {
     ],
     starts: |frame, _| {
         // A width that is a fifth off meets the flanks at the wrong time and explains little.
-        let least = (3.0 * frame.grid).max(2e-3) * 1e3;
+        let of_turn = LEAST_TURN * std::f64::consts::TAU / frame.unit;
+        let least = (3.0 * frame.grid).max(of_turn.min(LEAST)) * 1e3;
         let widths = log_spaced(least, (10.0 * least).max(300.0), 12);
         widths.flat_map(of_width).collect()
     },
