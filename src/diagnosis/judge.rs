@@ -286,10 +286,11 @@ pub fn refuted(gains: &[Gain], causes: &[Effect]) -> bool {
     motor().map(|gain| (gain.before / gain.after).ln()).sum::<f64>() < 0.0 && (surely_worse || !surely_better)
 }
 
-/// Whether a machine surely moves worse than the belief under its servo. What is right as far as it goes may leave much, and moves
-/// no worse for it; what stands in for something else follows the torque and not what made it.
+/// Whether a machine surely moves worse than the belief under its servo, by what can be seen. What is right as far as it goes may leave
+/// much, and moves no worse for it; what stands in for something else follows the torque and not what made it.
 fn moves_worse(gains: &[Gain]) -> bool {
-    gains.iter().any(|gain| gain.channel == "position" && gain.ci95[1] < 1.0)
+    let worse = |gain: &Gain| gain.ci95[1] < 1.0 && gain.after > LEAST_RATIO * gain.before;
+    gains.iter().any(|gain| gain.channel == "position" && worse(gain))
 }
 
 /// Whether a hold-out shows in any channel what the causes change: one whose moves do not call them up says nothing of them.
@@ -409,6 +410,14 @@ mod tests {
         assert!(refuted(std::slice::from_ref(&worse), &saturation(0.3)) && !refuted(&[better], &saturation(0.3)));
         assert!(!refuted(std::slice::from_ref(&worse), &saturation(0.0)));
         assert!(refuted(&[worse, gain("position", 0.9)], &saturation(0.0)));
+    }
+
+    #[test]
+    fn a_position_that_is_surely_worse_by_nothing_that_can_be_seen_refutes_nothing() {
+        let position =
+            |ratio: f64| Gain { channel: "position", before: ratio, after: 1.0, ci95: [0.999 * ratio, 1.001 * ratio] };
+        assert!(moves_worse(&[position(0.95)]) && !moves_worse(&[position(0.995)]) && !moves_worse(&[position(1.1)]));
+        assert!(!moves_worse(&[Gain { channel: "torque", ..position(0.5) }]));
     }
 
     #[test]

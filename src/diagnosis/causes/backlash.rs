@@ -6,10 +6,11 @@
 
 use super::*;
 
-/// Least width that is looked for, load units, and of a motor whose turn moves the load by little as a share of its turn: a rotary table
-/// behind a worm has a clearance of less than a thousandth of a degree.
-const LEAST: f64 = 2e-3;
-const LEAST_TURN: f64 = 2e-4;
+/// Least width that is looked for, load units: a fine encoder tells less than a micrometre, and behind a worm less than a thousandth of a
+/// degree.
+const LEAST: f64 = 3e-4;
+/// A width over the one looked for before it, at most.
+const NEXT: f64 = 1.6;
 
 /// Parameters: full width in µm, shares of inertia and friction on the table's side, how stiff the flanks meet
 /// in Hz. The trace has no coefficient.
@@ -23,9 +24,10 @@ pub static LAW: Law = Law {
     ],
     starts: |frame, _| {
         // A width that is a fifth off meets the flanks at the wrong time and explains little.
-        let of_turn = LEAST_TURN * std::f64::consts::TAU / frame.unit;
-        let least = (3.0 * frame.grid).max(of_turn.min(LEAST)) * 1e3;
-        let widths = log_spaced(least, (10.0 * least).max(300.0), 12);
+        let least = (3.0 * frame.grid).max(LEAST) * 1e3;
+        let most = (10.0 * least).max(300.0);
+        let count = (most / least).ln() / NEXT.ln();
+        let widths = log_spaced(least, most, count.ceil() as usize + 1);
         widths.flat_map(of_width).collect()
     },
     manner: Manner {
