@@ -3,6 +3,7 @@
 //! The effect is then looked for as if nothing were known of it, and what is found takes its place.
 
 use super::belief;
+use super::causes::position_dependent_friction;
 use super::fit::{Bench, Fit};
 use super::frame::Frame;
 use super::judge::{TOLERABLE_EXCESS, rms};
@@ -13,9 +14,6 @@ use super::select::{Search, is_physical};
 use super::verdict::Diagnosis;
 use crate::machine::{Axis, Cause, Effect};
 
-/// Correlation of the forms of two tight spots from which on they are one: bells that lie half a width apart, or of which one is twice as
-/// wide as the other, correlate by 0.9.
-const SAME_SPOT: f64 = 0.9;
 /// Most steps of a fit.
 const STEPS: usize = 8;
 /// Excess over the noise floor (in variance) that causes may leave: a floor that is read off a thousand rows is known better.
@@ -82,7 +80,7 @@ pub fn without_found_again(axis: &Axis, frame: &Frame, found: &[Effect]) -> Opti
     let alike = |believed: &Effect, found: &Effect| {
         let (Some(believed_shape), Some(shape)) = (shape(believed), shape(found)) else { return false };
         match believed.cause() {
-            Cause::PositionDependentFriction => is_same_spot(&believed_shape, &shape),
+            Cause::PositionDependentFriction => position_dependent_friction::is_same_place(&believed_shape, &shape),
             _ => has_phase(believed) && has_phase(found) && (shape[0] - believed_shape[0]).abs() < 1.0,
         }
     };
@@ -90,15 +88,4 @@ pub fn without_found_again(axis: &Axis, frame: &Frame, found: &[Effect]) -> Opti
         |believed: &Effect| found.iter().any(|found| found.cause() == believed.cause() && alike(believed, found));
     let others: Vec<Effect> = axis.effects.iter().copied().filter(|effect| !again(effect)).collect();
     (others.len() < axis.effects.len()).then(|| axis.with_effects(others))
-}
-
-/// Whether spots (centre, width, exponent) are the same but for their height: their forms go together.
-fn is_same_spot(one: &[f64], other: &[f64]) -> bool {
-    const PLACES: i32 = 400;
-    let form = |shape: &[f64], x: f64| (-((x - shape[0]) / shape[1]).abs().powf(shape[2])).exp();
-    let products = |a: &[f64], b: &[f64]| -> f64 {
-        // The stroke, and as much beyond each end as a spot may be centred at and wide.
-        (-PLACES..=2 * PLACES).map(|i| f64::from(i) / f64::from(PLACES)).map(|x| form(a, x) * form(b, x)).sum()
-    };
-    products(one, other) > SAME_SPOT * (products(one, one) * products(other, other)).sqrt()
 }

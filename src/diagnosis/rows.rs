@@ -106,10 +106,10 @@ pub fn beside_filled(columns: &Columns, margin: usize) -> Vec<bool> {
 /// Rows away from the ends of their stretch, thinned to the filter's own density, that carry weight.
 pub fn judged_rows(columns: &Columns, margin: usize, stride: usize, carries: impl Fn(usize) -> bool) -> Vec<usize> {
     let mut kept = Vec::new();
-    let (low, high) = columns.position.iter().fold((f64::MAX, f64::MIN), |(lo, hi), x| (x.min(lo), x.max(hi)));
+    let stroke = extent(&columns.position);
     for s in &columns.stretches {
         if s.len() > 4 * margin {
-            let begin = first_known(columns, s, high - low);
+            let begin = first_known(columns, s, stroke);
             kept.extend((begin + margin..s.end - margin).step_by(stride).filter(|&row| carries(row)));
         }
     }

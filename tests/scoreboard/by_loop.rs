@@ -1,8 +1,7 @@
 //! What acts in a few rows about each reversal is found by torque and closed loop together, down to some ten steps of the encoder; a servo
 //! that is another one than is believed is not taken for a cause of the vocabulary.
 
-use crate::generated::{Coupling, Rig, ServoGains, Truth, rig, said};
-use std::f64::consts::TAU;
+use crate::generated::{Rig, ServoGains, Truth, rig, said, set_apart};
 
 /// A rig with much friction, a fine encoder and a servo that takes its time.
 fn slow() -> Rig {
@@ -28,11 +27,7 @@ fn slow() -> Rig {
 
 /// A table with most of the mass and friction behind a clearance, mm, whose flanks meet as hard as so many Hz.
 fn clearance(truth: &mut Truth, width: f64, hz: f64) {
-    let (inertia_share, friction_share) = (0.6, 0.78);
-    let stiffness = (TAU * hz).powi(2) * truth.inertia * inertia_share * (1.0 - inertia_share);
-    let damping = 0.2 * stiffness / (TAU * hz);
-    truth.coupling =
-        Some(Coupling { stiffness, damping, clearance: width / truth.unit, inertia_share, friction_share });
+    set_apart(truth, width, hz, [0.6, 0.78], 0.1);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //! and a simulated table swings by the grid alone. Such a spring is found all the same, and one that is believed is not doubted for its
 //! swing.
 
-use crate::generated::{Coupling, Rig, ServoGains, Truth, rig, said, said_believing, said_of_slow_ways};
+use crate::generated::{Rig, ServoGains, Truth, rig, said, said_believing, said_of_slow_ways, set_apart};
 use serde_json::json;
 use std::f64::consts::TAU;
 
@@ -24,13 +24,9 @@ fn coarse() -> Rig {
     Rig { servo, encoder_step: 5e-4, ..rig() }
 }
 
-/// The spring: stiffness and damping in the motor's coordinate.
+/// The spring.
 fn spring(truth: &mut Truth) {
-    let [inertia_share, friction_share] = TABLE;
-    let reduced = truth.inertia * inertia_share * (1.0 - inertia_share);
-    let omega = TAU * RESONANCE_HZ;
-    let (stiffness, damping) = (omega * omega * reduced, 2.0 * DAMPING * omega * reduced);
-    truth.coupling = Some(Coupling { stiffness, damping, clearance: 0.0, inertia_share, friction_share });
+    set_apart(truth, 0.0, RESONANCE_HZ, TABLE, DAMPING);
 }
 
 #[test]

@@ -5,8 +5,10 @@ use crate::board::random::Random;
 use crate::board::record;
 pub use crate::board::rig::{Drive, Rig, ServoGains};
 use crate::board::rough::Rough;
-pub use crate::board::truth::{Coupling, Truth};
+use crate::board::truth::Coupling;
+pub use crate::board::truth::Truth;
 use serde_json::Value;
+use std::f64::consts::TAU;
 
 /// A ball screw of 10 mm under a servo of its own, with an encoder on a grid of 1 µm and a torque that is known well.
 pub fn rig() -> Rig {
@@ -22,7 +24,7 @@ pub fn rig() -> Rig {
     Rig {
         drive: Drive::BallScrew,
         gearing: 10.0,
-        unit: 10.0 / std::f64::consts::TAU,
+        unit: 10.0 / TAU,
         inertia: 0.0028,
         coulomb: 0.9,
         viscous: 0.008,
@@ -37,6 +39,22 @@ pub fn rig() -> Rig {
         rough: Rough::NONE,
         ..Rig::draw(&mut Random::new(1, 1), 10.0)
     }
+}
+
+/// A table behind a spring, or behind flanks as hard with a clearance (load units) between them, that swings at so many Hz; its share of
+/// inertia and friction, and how the swing is damped.
+pub fn set_apart(
+    truth: &mut Truth,
+    clearance: f64,
+    hz: f64,
+    [inertia_share, friction_share]: [f64; 2],
+    damping_ratio: f64,
+) {
+    let omega = TAU * hz;
+    let stiffness = omega * omega * truth.inertia * inertia_share * (1.0 - inertia_share);
+    let damping = 2.0 * damping_ratio * stiffness / omega;
+    truth.coupling =
+        Some(Coupling { stiffness, damping, clearance: clearance / truth.unit, inertia_share, friction_share });
 }
 
 /// What is said of a rig as believed by a recording of another with something changed: verdict and named causes with their first value.

@@ -1,19 +1,17 @@
 //! A rotary table behind a worm of 120 turns: what is little of a degree is much of a turn of the motor.
 
 use crate::board::rig::{Drive, Scale};
-use crate::generated::{Coupling, Rig, Truth, rig, said};
+use crate::generated::{Rig, rig, said, set_apart};
 use std::f64::consts::TAU;
 
 const RATIO: f64 = 120.0;
-/// deg of the table to a rad of the motor.
-const UNIT: f64 = 360.0 / TAU / RATIO;
 
 #[test]
 fn a_clearance_of_less_than_a_thousandth_of_a_degree_is_found_behind_a_worm() {
     let worm = Rig {
         drive: Drive::Rotary,
         gearing: RATIO,
-        unit: UNIT,
+        unit: 360.0 / TAU / RATIO,
         inertia: 0.001,
         viscous: 0.002,
         encoder_step: 1e-5,
@@ -22,15 +20,8 @@ fn a_clearance_of_less_than_a_thousandth_of_a_degree_is_found_behind_a_worm() {
         ..rig()
     };
     const WIDTH_DEG: f64 = 0.7e-3;
-    let clearance = |truth: &mut Truth| {
-        let [inertia_share, friction_share] = [0.55, 0.6];
-        let reduced = truth.inertia * inertia_share * (1.0 - inertia_share);
-        let omega = TAU * 500.0;
-        let (stiffness, damping) = (omega * omega * reduced, 2.0 * 0.3 * omega * reduced);
-        truth.coupling =
-            Some(Coupling { stiffness, damping, clearance: WIDTH_DEG / UNIT, inertia_share, friction_share });
-    };
     for seed in [41, 42] {
+        let clearance = |truth: &mut _| set_apart(truth, WIDTH_DEG, 500.0, [0.55, 0.6], 0.3);
         let (verdict, findings) = said([&worm, &worm], seed, clearance);
         println!("seed {seed}: {verdict} {findings:?}");
         let [(cause, width)] = findings.as_slice() else { panic!("{verdict}: {findings:?}") };

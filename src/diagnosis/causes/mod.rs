@@ -12,7 +12,7 @@ mod direction_dependent_friction;
 pub mod drive_compliance;
 mod external_vibration;
 mod inertia_mismatch;
-mod position_dependent_friction;
+pub mod position_dependent_friction;
 mod quadratic_drag;
 mod screw_periodic_error;
 mod screw_pitch_error;

@@ -11,6 +11,10 @@ const STEEPEST: f64 = 60.0;
 /// Mean of the form over the stroke from which on it is friction everywhere, with a place where there is less.
 const MOST_OF_STROKE: f64 = 0.75;
 
+/// Correlation of the forms of two spots from which on they are in one place: bells that lie 0.46 widths apart, or of which one is twice
+/// as wide as the other, correlate by 0.9.
+const SAME_PLACE: f64 = 0.9;
+
 /// Parameters: centre and width as shares of the stroke, and n. The coefficient is the peak.
 pub static LAW: Law = Law {
     cause: Cause::PositionDependentFriction,
@@ -60,9 +64,41 @@ fn place(frame: &Frame, shape: &[f64]) -> (f64, f64) {
     (low + shape[0] * (high - low), shape[1] * (high - low))
 }
 
+/// A spot of size 1 at a share of the stroke.
+fn form(shape: &[f64], at: f64) -> f64 {
+    (-((at - shape[0]).abs() / shape[1]).powf(shape[2])).exp()
+}
+
 /// Mean over the stroke of a spot of size 1.
 fn mean(shape: &[f64]) -> f64 {
     const PLACES: u32 = 64;
-    let distance = |i: u32| ((f64::from(i) + 0.5) / f64::from(PLACES) - shape[0]).abs() / shape[1];
-    (0..PLACES).map(|i| (-distance(i).powf(shape[2])).exp()).sum::<f64>() / f64::from(PLACES)
+    (0..PLACES).map(|i| form(shape, (f64::from(i) + 0.5) / f64::from(PLACES))).sum::<f64>() / f64::from(PLACES)
+}
+
+/// Whether spots are the same but for their size: their forms go together.
+#[must_use]
+pub fn is_same_place(one: &[f64], other: &[f64]) -> bool {
+    const PLACES: i32 = 400;
+    let products = |a: &[f64], b: &[f64]| -> f64 {
+        // The stroke, and as much beyond each end as a spot may be wide.
+        (-PLACES..=2 * PLACES).map(|i| f64::from(i) / f64::from(PLACES)).map(|at| form(a, at) * form(b, at)).sum()
+    };
+    products(one, other) > SAME_PLACE * (products(one, one) * products(other, other)).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Bells of one width correlate by exp(−d²/2), d widths apart; in one place by √(2r/(1 + r²)), one r times as wide.
+    #[test]
+    fn spots_in_one_place_are_told_from_others() {
+        let bell = [0.4, 0.1, BELL];
+        for (beside, same) in [(0.0, true), (0.4, true), (0.52, false), (-0.52, false), (3.0, false)] {
+            assert_eq!(is_same_place(&bell, &[0.4 + 0.1 * beside, 0.1, BELL]), same, "{beside} widths beside");
+        }
+        for (wider, same) in [(1.8, true), (2.15, false), (0.55, true), (0.45, false)] {
+            assert_eq!(is_same_place(&bell, &[0.4, 0.1 * wider, BELL]), same, "{wider} times as wide");
+        }
+    }
 }
