@@ -166,7 +166,7 @@ fn trajectory(file: &Path, axis: &Axis, period_s: f64) -> std::result::Result<Ve
     let command = recording.need(&axis.name, Signal::PositionCommand, unit)?;
     let seconds = recording.time_s[recording.rows() - 1] - recording.time_s[0];
     let cycles = (seconds / period_s + 1e-6) as usize + 1;
-    Ok(gib::plant::closed_loop::command_of_cycles(&recording.time_s, &command, period_s, cycles).collect())
+    Ok(gib::plant::at_rows::command_of_cycles(&recording.time_s, &command, period_s, cycles).collect())
 }
 
 fn write(file: &Path, axis: &Axis, trace: &Trace) -> io::Result<()> {

@@ -4,15 +4,17 @@
 //! that was added to the servo's, where there was such, and which of three differences the control takes for the command's speed.
 
 use super::added::{Added, ByServo, Pulses};
-use super::between::cubic_of;
+use super::at_rows::{AtRows, Between, ROUNDED, Reader, command_of_cycles};
+use super::lateness::Lateness;
 use super::noise::Noise;
 use super::observed::Observed;
 use super::physics::{Physics, Ripple};
 use super::predict::{TorquePrediction, predict_torque};
 use super::servo::{CommandSpeed, by_clock};
-use super::simulate::{Rows, Sensors, Setup, Start, simulate_cycles, steps_per_cycle};
+use super::simulate::{Sensors, Setup, Start, simulate_cycles, steps_per_cycle};
+use super::sudden;
 use crate::machine::{Axis, Servo};
-use std::iter::Peekable;
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// A replayed recording, one value a row, load units.
@@ -27,7 +29,7 @@ pub struct ClosedLoop {
 /// Everything that a machine file says about a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prediction {
-    /// Torque from the measured motion; at rest that of the closed loop, where there is one.
+    /// Torque from the measured motion; what is too sudden for that, and at rest, by the closed loop, where there is one.
     pub torque: TorquePrediction,
     /// The closed loop; `None` without a servo or a recorded command.
     pub closed_loop: Option<ClosedLoop>,
@@ -71,8 +73,8 @@ fn replayed(
     servo: &ByServo,
 ) -> Result<Prediction, String> {
     let rest = later(rows_at_rest(observed), torque.physics.delay_s / observed.period_s, observed.time_s.len());
-    let begun = Begun::of(axis, observed, &mut torque, &rest, servo)?;
-    let replay = |speed, added| Replay::felt(axis, observed, &torque, &rest, speed, added);
+    let begun = Begun::of(axis, observed, &mut torque, servo)?;
+    let replay = |speed, added| Replay::felt(axis, observed, &torque, speed, added);
     let mut best = replay(CommandSpeed::Central, servo.added[0].as_ref())?;
     if servo.speed != CommandSpeed::Central {
         let other = replay(servo.speed, servo.added[1].as_ref())?;
@@ -83,15 +85,20 @@ fn replayed(
             }
         }
     }
-    let Some(Replay { command_speed, replayed, torque_at_rest, added }) = best else {
+    let Some(Replay { command_speed, replayed, alone, torque: mut of_loop, added }) = best else {
         let command_speed = CommandSpeed::Central;
         return Ok(Prediction { torque, closed_loop: None, added: None, command_speed });
     };
-    for (row, at_rest) in rest.into_iter().flatten().zip(torque_at_rest) {
-        torque.torque[row] = at_rest;
+    // The predicted torque knows nothing of what the torque column told of the beginning.
+    let mut position = Cow::Borrowed(alone.as_ref().unwrap_or(&replayed.position));
+    if let Some(Begun { position: by_itself, torque }) = begun {
+        position.to_mut()[..by_itself.len()].copy_from_slice(&by_itself);
+        of_loop[..torque.len()].copy_from_slice(&torque);
     }
-    for (row, at_rest) in begun.into_iter().flat_map(|begun| begun.rest.into_iter().flatten().zip(begun.torque)) {
-        torque.torque[row] = at_rest;
+    sudden::add(&mut torque, axis, observed, &position, &of_loop);
+    drop(position);
+    for row in rest.into_iter().flatten() {
+        torque.torque[row] = of_loop[row];
     }
     Ok(Prediction { torque, closed_loop: Some(replayed), added: added.map(|added| added.pulses), command_speed })
 }
@@ -208,9 +215,9 @@ impl Part {
 /// Times of the servo, 1/Kp and Ti, for which the axis has moved when nothing is left of how its servo began.
 const FORGOTTEN: f64 = 8.0;
 
-/// The torque in the first rows at rest by what the machine itself says of its beginning, where the servo began otherwise.
+/// The first rows by what the machine itself says of its beginning, where the servo began otherwise.
 struct Begun {
-    rest: Vec<Range<usize>>,
+    position: Vec<f64>,
     torque: Vec<f64>,
 }
 
@@ -221,20 +228,20 @@ impl Begun {
         axis: &Axis,
         observed: &Observed,
         torque: &mut TorquePrediction,
-        rest: &[Range<usize>],
         servo: &ByServo,
     ) -> Result<Option<Self>, String> {
         let (Some(held), Some(law)) = (servo.held_at_start, &axis.servo) else { return Ok(None) };
         let rows = rows_of_the_beginning(law, observed);
         let part = Part { rows, ..Part::whole(observed) };
-        let rest: Vec<Range<usize>> =
-            rest.iter().map(|range| range.start..range.end.min(rows)).filter(|range| !range.is_empty()).collect();
-        let begins = |torque: &TorquePrediction| replay(axis, observed, torque, &rest, &[], servo.speed, part);
-        let by_itself = begins(torque)?;
+        let first = [0..rows];
+        let begins = |torque: &TorquePrediction, rows: &[Range<usize>]| {
+            replay(axis, observed, torque, rows, &[], servo.speed, part)
+        };
+        let by_itself = begins(torque, &first)?;
         let itself = std::mem::replace(&mut torque.at_start, held);
-        let (Some((alone, at_rest)), Some((with, _))) = (by_itself, begins(torque)?) else { return Ok(None) };
+        let (Some((alone, of_rows)), Some((with, _))) = (by_itself, begins(torque, &[])?) else { return Ok(None) };
         if error_of(observed, &with) < error_of(observed, &alone) {
-            return Ok(Some(Self { rest, torque: at_rest }));
+            return Ok(Some(Self { position: alone.position, torque: of_rows }));
         }
         torque.at_start = itself;
         Ok(None)
@@ -256,8 +263,10 @@ pub fn rows_of_the_beginning(servo: &Servo, observed: &Observed) -> usize {
 struct Replay<'s> {
     command_speed: CommandSpeed,
     replayed: ClosedLoop,
-    /// In the rows at rest, by the servo alone.
-    torque_at_rest: Vec<f64>,
+    /// The position by the servo alone, where that is another.
+    alone: Option<Vec<f64>>,
+    /// The torque column by the servo alone.
+    torque: Vec<f64>,
     /// What was added to the servo's torque, where that repeats the position better: what only the torque sensor saw, the axis
     /// did not feel.
     added: Option<&'s Added>,
@@ -269,20 +278,19 @@ impl<'s> Replay<'s> {
         axis: &Axis,
         observed: &Observed,
         torque: &TorquePrediction,
-        rest: &[Range<usize>],
         command_speed: CommandSpeed,
         added: Option<&'s Added>,
     ) -> Result<Option<Self>, String> {
-        let whole = Part::whole(observed);
-        let alone = replay(axis, observed, torque, rest, &[], command_speed, whole)?;
-        let Some((replayed, torque_at_rest)) = alone else {
+        let (whole, all) = (Part::whole(observed), [0..observed.time_s.len()]);
+        let Some((replayed, torque_alone)) = replay(axis, observed, torque, &all, &[], command_speed, whole)? else {
             return Ok(None);
         };
-        let mut felt = Self { command_speed, replayed, torque_at_rest, added: None };
+        let mut felt = Self { command_speed, replayed, alone: None, torque: torque_alone, added: None };
         if let Some(added) = added {
             if let Some((with, _)) = replay(axis, observed, torque, &[], &added.torque, command_speed, whole)? {
                 if error_of(observed, &with) < felt.error(observed) {
-                    felt = Self { replayed: with, added: Some(added), ..felt };
+                    felt.alone = Some(std::mem::replace(&mut felt.replayed, with).position);
+                    felt.added = Some(added);
                 }
             }
         }
@@ -301,7 +309,7 @@ fn error_of(observed: &Observed, replayed: &ClosedLoop) -> f64 {
 }
 
 /// Simulates the recorded command under the axis's servo; `prediction` gives the numbers and the phases of its ripples, `added`
-/// what is added to the servo's torque in each cycle (empty for nothing). Beside the motion the torque in the rows at rest.
+/// what is added to the servo's torque in each cycle (empty for nothing). Beside the motion the torque in some rows.
 ///
 /// `None` where the axis has no servo or the recording no command.
 ///
@@ -311,7 +319,7 @@ fn replay(
     axis: &Axis,
     observed: &Observed,
     prediction: &TorquePrediction,
-    rest: &[Range<usize>],
+    torque_of: &[Range<usize>],
     added: &[f64],
     command_speed: CommandSpeed,
     part: Part,
@@ -344,64 +352,22 @@ fn replay(
         let exact = (time[row] - begin) / servo.period_s;
         if (exact - exact.round()).abs() <= ROUNDED { exact.round() } else { exact }
     };
-    // The torque column shows what was there a delay before.
+    // The torque column shows what was there a delay before, read between cycles as the rest of a prediction takes it.
     let late = prediction.physics.delay_s / servo.period_s;
     let shown = |row: usize| (place(row) - late).clamp(0.0, (cycles - 1) as f64);
     let with_table = observed.table_position.is_some();
+    let lagging = Between::Lagging(Lateness::rate(&servo));
+    let count = torque_of.iter().map(Range::len).sum();
     let mut rows = AtRows {
-        motor: Reader::new(cycles, time.len(), (0..time.len()).map(place)),
-        table: with_table.then(|| Reader::new(cycles, time.len(), (0..time.len()).map(place))),
-        torque: Reader::new(cycles, rest.iter().map(Range::len).sum(), rest.iter().cloned().flatten().map(shown)),
+        motor: Reader::new(cycles, time.len(), (0..time.len()).map(place), Between::Smooth),
+        table: with_table.then(|| Reader::new(cycles, time.len(), (0..time.len()).map(place), Between::Smooth)),
+        torque: Reader::new(cycles, count, torque_of.iter().cloned().flatten().map(shown), lagging),
     };
-    let physics = prediction.physics.clone();
+    let mut physics = prediction.physics.clone();
+    physics.delay_s = 0.0;
     simulate_cycles(axis, physics, command, added, &setup, &mut Noise::new(0), &mut rows)?;
     let table_position = rows.table.map(|table| table.values);
     Ok(Some((ClosedLoop { position: rows.motor.values, table_position }, rows.torque.values)))
-}
-
-/// What a simulation gives, at the rows of a recording.
-struct AtRows<M: Iterator<Item = f64>, T: Iterator<Item = f64>> {
-    motor: Reader<M>,
-    table: Option<Reader<M>>,
-    torque: Reader<T>,
-}
-
-impl<M: Iterator<Item = f64>, T: Iterator<Item = f64>> Rows for AtRows<M, T> {
-    fn positions(&mut self, motor: f64, table: f64) {
-        self.motor.add(motor);
-        if let Some(reader) = &mut self.table {
-            reader.add(table);
-        }
-    }
-
-    fn torque(&mut self, torque: f64) {
-        self.torque.add(torque);
-    }
-}
-
-/// Reads a series of so many cycles, which comes one after the other, at places between them that rise.
-struct Reader<P: Iterator<Item = f64>> {
-    cycles: usize,
-    places: Peekable<P>,
-    came: usize,
-    /// The last cycles, each at its remainder: a cubic takes four.
-    last: [f64; 4],
-    values: Vec<f64>,
-}
-
-impl<P: Iterator<Item = f64>> Reader<P> {
-    fn new(cycles: usize, count: usize, places: P) -> Self {
-        let values = Vec::with_capacity(count);
-        Self { cycles, places: places.peekable(), came: 0, last: [0.0; 4], values }
-    }
-
-    fn add(&mut self, value: f64) {
-        self.last[self.came % 4] = value;
-        self.came += 1;
-        while let Some(place) = self.places.next_if(|place| self.came >= self.cycles.min(*place as usize + 3)) {
-            self.values.push(cubic_of(self.cycles, |k| self.last[k % 4], place));
-        }
-    }
 }
 
 /// Rows at rest, whose torque is that of the replay; a torque column that is late shows it as much later.
@@ -432,56 +398,4 @@ fn later(rows: Vec<Range<usize>>, by: f64, all: usize) -> Vec<Range<usize>> {
     let by = by.round() as isize;
     let moved = |row: usize| row.saturating_add_signed(by).min(all);
     rows.into_iter().map(|rows| moved(rows.start)..moved(rows.end)).filter(|rows| !rows.is_empty()).collect()
-}
-
-/// Share of a cycle that is none: times are written rounded.
-const ROUNDED: f64 = 1e-3;
-
-/// The command at the start of each servo cycle: interpolated between rows, held over rows without one.
-pub fn command_of_cycles(time_s: &[f64], command: &[f64], period: f64, cycles: usize) -> impl Iterator<Item = f64> {
-    let known = time_s.iter().zip(command).filter(|(_, x)| x.is_finite());
-    let mut rows = known.map(|(t, x)| (t - time_s[0], *x));
-    let first = rows.next();
-    let (mut now, mut next) = (first, rows.next());
-    (0..cycles).map(move |cycle| {
-        let t = cycle as f64 * period;
-        while let Some(row) = next.filter(|row| row.0 <= t + ROUNDED * period) {
-            (now, next) = (Some(row), rows.next());
-        }
-        let (Some((_, x_first)), Some((t0, x0))) = (first, now) else { return 0.0 };
-        if (t - t0).abs() <= ROUNDED * period {
-            return x0;
-        }
-        match next {
-            Some((t1, x1)) if t >= t0 => x0 + (x1 - x0) * (t - t0) / (t1 - t0),
-            Some(_) => x_first,
-            None => x0,
-        }
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_command_of_a_cycle_is_that_of_its_row() {
-        let time: Vec<f64> = (0..100).map(|i| f64::from(i) * 1e-3).collect();
-        let command: Vec<f64> = time.iter().map(|t| t * t).collect();
-        assert!(command_of_cycles(&time, &command, 1e-3, 100).eq(command.iter().copied()));
-        // Four cycles a row: between the rows a straight line.
-        let fine: Vec<f64> = command_of_cycles(&time, &command, 0.25e-3, 397).collect();
-        assert_eq!(fine.len(), 397);
-        for (cycle, x) in fine.iter().enumerate() {
-            let t = cycle as f64 * 0.25e-3;
-            assert!((x - t * t).abs() < 0.26e-6, "{cycle}");
-        }
-    }
-
-    #[test]
-    fn a_row_without_a_command_is_bridged() {
-        let time = [0.0, 1.0, 2.0, 3.0];
-        let command = [f64::NAN, 1.0, f64::NAN, 3.0];
-        assert!(command_of_cycles(&time, &command, 1.0, 4).eq([1.0, 1.0, 2.0, 3.0]));
-    }
 }

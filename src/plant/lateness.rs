@@ -5,7 +5,7 @@
 //! at a logging delay of n + f cycles a row holds (1 − w)·T₋ₙ + w·T₋ₙ₋₁ with w = (e^(−r·(1−f)) − e^(−r))/(1 − e^(−r)).
 //! To the second order that is T later by n + w cycles, and flattened by w·(1 − w)/2 of its second difference.
 
-use crate::machine::Axis;
+use crate::machine::{Axis, Servo};
 
 /// Timing of the torque column of one recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,8 +34,13 @@ impl Lateness {
             return none;
         }
         let seen = if lag > 0.0 { period / (1.0 - (-period / lag).exp()) } else { period };
-        let rate = if lag > 0.0 { period / lag } else { 0.0 };
+        let rate = Self::rate(servo);
         Self { by_sampling_s: seen - 0.5 * period - lag, cycle: Some((period, rate)) }
+    }
+
+    /// Ts/τ of a servo; 0 where no time constant is known.
+    pub(super) fn rate(servo: &Servo) -> f64 {
+        if servo.torque_time_constant_s > 0.0 { servo.period_s / servo.torque_time_constant_s } else { 0.0 }
     }
 
     /// How much later the column is by a logging delay, s.
@@ -43,7 +48,7 @@ impl Lateness {
     pub fn of_delay(&self, delay_s: f64) -> f64 {
         let Some((period, rate)) = self.cycle else { return delay_s };
         let (whole, part) = split(delay_s / period);
-        period * (whole + share(rate, part))
+        period * (whole + share_of_earlier(rate, part))
     }
 
     /// The logging delay by which the column is so much later, s; the inverse of [`Lateness::of_delay`], but of whole cycles
@@ -80,7 +85,7 @@ const STEPS: f64 = 4.0;
 const UNSEEN: f64 = 0.03;
 
 /// The share w of the earlier end of the cycle in a torque caught a part f of a cycle before its later end.
-fn share(rate: f64, part: f64) -> f64 {
+pub(super) fn share_of_earlier(rate: f64, part: f64) -> f64 {
     if rate < STRAIGHT {
         return part;
     }
@@ -138,7 +143,7 @@ mod tests {
             let cycle = place as usize;
             asked(cycle) + (starts[cycle] - asked(cycle)) * (-rate * place.fract()).exp()
         };
-        let w = share(rate, 0.3);
+        let w = share_of_earlier(rate, 0.3);
         for row in 5..20 {
             assert!((caught(row) - (1.0 - w) * starts[row - 2] - w * starts[row - 3]).abs() < 1e-12);
         }

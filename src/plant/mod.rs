@@ -1,12 +1,14 @@
 //! Simulation: what an axis does, and what its motion says its motor must deliver.
 
 pub mod added;
+pub mod at_rows;
 pub mod axis;
 mod behind;
 pub mod between;
 pub mod bridges;
 pub mod closed_loop;
 pub mod coupling;
+mod cutoff;
 pub mod friction;
 pub mod lateness;
 pub mod linear;
@@ -21,3 +23,4 @@ pub mod servo;
 pub mod simulate;
 pub mod stamps;
 pub mod stretches;
+mod sudden;

@@ -7,9 +7,9 @@
 //! forward-backward filtering*, 1996.)
 
 use super::between::cubic_at;
+use super::cutoff::noise_crossing_hz;
 use super::linear::rms;
 use super::stamps::are_even;
-use realfft::RealFftPlanner;
 use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -96,7 +96,7 @@ impl Motion {
     #[must_use]
     pub fn standing_speed(&self) -> f64 {
         let typical = rms(self.velocities().filter(|v| v.is_finite()));
-        (3.0 * std::f64::consts::TAU * self.cutoff_hz * self.resolution).max(1e-6 * typical)
+        (3.0 * TAU * self.cutoff_hz * self.resolution).max(1e-6 * typical)
     }
 
     /// Motion of a whole stretch of rows: times strictly increasing, positions finite. Irregular times are resampled to
@@ -134,6 +134,19 @@ impl Motion {
         }
         motion.resolution = (square / rows.max(1) as f64).sqrt();
         Some(motion)
+    }
+
+    /// Motion of other positions in the same stretches, through the same cut-off: as far as this one is known.
+    #[must_use]
+    pub fn like_this(&self, time_s: &[f64], position: &[f64]) -> Motion {
+        let mut like = Motion { position: vec![f64::NAN; position.len()], pieces: Vec::new(), ..*self };
+        for rows in self.pieces.iter().map(|piece| piece.rows.clone()) {
+            let part = Self::with_cutoff(&time_s[rows.clone()], &position[rows.clone()], Some(self.cutoff_hz));
+            let Some(part) = part else { continue };
+            like.pieces.extend(part.pieces.into_iter().map(|piece| Piece { rows: rows.clone(), ..piece }));
+            like.position[rows].copy_from_slice(&part.position);
+        }
+        like
     }
 
     /// The same with a given cut-off, for instance that of the whole recording for one short stretch of it.
@@ -292,61 +305,6 @@ impl Section {
     }
 }
 
-/// Frequency at which the spectrum of motion, over all pieces of a recording, has sunk to that of the position's white noise.
-#[must_use]
-pub fn noise_crossing_hz(pieces: &[&[f64]], period: f64) -> f64 {
-    let rate = 1.0 / period;
-    let longest = pieces.iter().map(|piece| piece.len()).max().unwrap_or(0);
-    let length = (longest / 4).clamp(FEWEST_ROWS, 2048) & !1;
-    let spectrum = position_spectrum(pieces, length);
-    let bins = spectrum.len();
-    let band = |low: f64, high: f64| {
-        let low = ((low * length as f64) as usize).min(bins - 1);
-        low..((high * length as f64).ceil() as usize).clamp(low + 1, bins)
-    };
-    let mut top: Vec<f64> = spectrum[band(0.35, 0.49)].to_vec();
-    let middle = top.len() / 2;
-    let noise = *top.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let lowest = 4.0 / length as f64;
-    let mut frequency = 0.25;
-    while frequency > lowest {
-        // The middle one of the neighbours: a line in the noise is no motion.
-        let mut neighbours = spectrum[band(frequency / 1.12, frequency * 1.12)].to_vec();
-        let middle = neighbours.len() / 2;
-        // Signal as large as the noise makes twice the noise. Twice that again is kept clear of noise that is not quite
-        // white; on a spectrum that falls as f⁻⁸ it moves the cut-off by a tenth.
-        if *neighbours.select_nth_unstable_by(middle, f64::total_cmp).1 > 4.0 * noise {
-            break;
-        }
-        frequency /= 1.04;
-    }
-    frequency.max(lowest) * rate
-}
-
-/// Power of the position per bin, from its second difference, in which neither stroke nor drift leaks.
-fn position_spectrum(pieces: &[&[f64]], length: usize) -> Vec<f64> {
-    let rows: usize = pieces.iter().map(|piece| piece.len()).sum();
-    let mut planner = RealFftPlanner::<f64>::new();
-    let fft = planner.plan_fft_forward(length);
-    let (mut input, mut output) = (fft.make_input_vec(), fft.make_output_vec());
-    let mut power = vec![0.0; output.len()];
-    // Half overlapping, and no more than some hundred segments however long the recording is.
-    let hop = (length / 2).max(rows / 256).max(1);
-    for segment in pieces.iter().flat_map(|piece| piece.windows(length + 2).step_by(hop)) {
-        for (i, (slot, x)) in input.iter_mut().zip(segment.windows(3)).enumerate() {
-            *slot = (x[2] - 2.0 * x[1] + x[0]) * 0.5 * (1.0 - (TAU * i as f64 / length as f64).cos());
-        }
-        if fft.process(&mut input, &mut output).is_ok() {
-            power.iter_mut().zip(&output).for_each(|(sum, c)| *sum += c.norm_sqr());
-        }
-    }
-    for (i, value) in power.iter_mut().enumerate() {
-        let gain = 2.0 * (PI * i as f64 / length as f64).sin();
-        *value /= gain.powi(4).max(1e-18);
-    }
-    power
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::noise::uniform_noise as noise;
@@ -395,36 +353,6 @@ mod tests {
         let w = TAU * 1.5;
         let error = rms((400..4600).map(|i| motion.acceleration(i) + 10.0 * w * w * (w * time[i]).sin()));
         assert!(error < 0.01 * 10.0 * w * w, "{error}");
-    }
-
-    /// Rows of a swing, taken or only written at scattered times: told by the motion, however it scatters.
-    #[test]
-    fn the_cutoff_found_is_near_the_best() {
-        let n = 20_000;
-        let time: Vec<f64> = (0..n).map(|i| f64::from(i) * 1e-3).collect();
-        // Reversals with jerk steps: x⃛ is a square wave, so the spectrum falls as f⁻⁸.
-        let (mut x, mut v, mut a) = (0.0, 0.0, 0.0);
-        let (mut clean, mut truth) = (Vec::new(), Vec::new());
-        for i in 0..n {
-            let phase = i % 1000;
-            let jerk = if (250..750).contains(&phase) { -2e4 } else { 2e4 };
-            clean.push(x);
-            truth.push(a);
-            let h = 1e-3;
-            x += h * v + h * h / 2.0 * a + h * h * h / 6.0 * jerk;
-            v += h * a + h * h / 2.0 * jerk;
-            a += h * jerk;
-        }
-        for sigma in [1e-5, 1e-3, 1e-1] {
-            let noisy: Vec<f64> = clean.iter().zip(noise(20_000)).map(|(x, e)| x + sigma * e).collect();
-            let error = |cutoff| {
-                let motion = Motion::with_cutoff(&time, &noisy, cutoff).unwrap();
-                rms((1000..19_000).map(|i| motion.acceleration(i) - truth[i]))
-            };
-            let best = (0..40).map(|k| error(Some(2.0 * 1.13_f64.powi(k)))).fold(f64::INFINITY, f64::min);
-            let found = error(None);
-            assert!(found < 1.3 * best, "noise {sigma}: {found} against {best}");
-        }
     }
 
     #[test]

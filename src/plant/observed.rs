@@ -35,6 +35,22 @@ pub struct Observed {
 }
 
 impl Observed {
+    /// The same rows of a motor that moves along other positions, known as far as the measured ones are; nothing else is known of it.
+    #[must_use]
+    pub fn moving_along(&self, position: &[f64]) -> Observed {
+        Observed {
+            time_s: self.time_s.clone(),
+            period_s: self.period_s,
+            position: Vec::new(),
+            torque: Vec::new(),
+            command: None,
+            table_position: None,
+            runs: self.runs.clone(),
+            motion: self.motion.like_this(&self.time_s, position),
+            filled: Vec::new(),
+        }
+    }
+
     /// The axis's columns of a recording.
     ///
     /// # Errors

@@ -43,12 +43,54 @@ pub struct TorquePrediction {
 pub fn predict_torque(axis: &Axis, observed: &Observed) -> Result<TorquePrediction, String> {
     let mut physics = Physics::of(axis)?;
     set_table_phases(&mut physics, observed);
-    let ripples = (std::mem::take(&mut physics.cogging), std::mem::take(&mut physics.vibration));
-    let lateness = Lateness::of(axis, observed.period_s);
-    let late_s = lateness.of_delay(physics.delay_s);
-    let by_rows = (lateness.by_sampling_s + late_s) / observed.period_s;
-    let flattened = lateness.flattened_s2(late_s) / observed.period_s.powi(2);
+    let mut torque = needed_in_all(&physics, observed);
+    let shown = Shown::of(axis, &physics, observed);
+    let phases_unknown = set_phases(&mut physics, observed, &torque, shown.by_rows);
+    add_ripples(axis, &physics, observed, &mut torque);
+    let at_start = torque.first().copied().unwrap_or(f64::NAN);
+    shown.delay(observed, &mut torque);
+    Ok(TorquePrediction { torque, at_start, physics, phases_unknown })
+}
 
+/// The torque column that the same rows would have if the motor had moved otherwise, with the phases that are known.
+#[must_use]
+pub(super) fn torque_of(axis: &Axis, physics: &Physics, observed: &Observed) -> Vec<f64> {
+    let mut torque = needed_in_all(physics, observed);
+    add_ripples(axis, physics, observed, &mut torque);
+    Shown::of(axis, physics, observed).delay(observed, &mut torque);
+    torque
+}
+
+/// How a torque column shows what the motor delivers.
+struct Shown {
+    /// Rows by which it is late.
+    by_rows: f64,
+    /// Second moment by which that flattens it, rows².
+    flattened: f64,
+}
+
+impl Shown {
+    fn of(axis: &Axis, physics: &Physics, observed: &Observed) -> Self {
+        let lateness = Lateness::of(axis, observed.period_s);
+        let late_s = lateness.of_delay(physics.delay_s);
+        Self {
+            by_rows: (lateness.by_sampling_s + late_s) / observed.period_s,
+            flattened: lateness.flattened_s2(late_s) / observed.period_s.powi(2),
+        }
+    }
+
+    fn delay(&self, observed: &Observed, torque: &mut [f64]) {
+        if self.by_rows != 0.0 {
+            observed.runs.iter().for_each(|run| shift(&mut torque[run.clone()], self.by_rows, self.flattened));
+        }
+    }
+}
+
+/// Torque that the motor must deliver, without ripples; NaN where the motion is not known.
+fn needed_in_all(physics: &Physics, observed: &Observed) -> Vec<f64> {
+    let mut physics = physics.clone();
+    physics.cogging.clear();
+    physics.vibration.clear();
     let mut torque = Vec::new();
     for run in &observed.runs {
         let needed = needed_torque(&physics, observed, run.clone());
@@ -60,24 +102,19 @@ pub fn predict_torque(axis: &Axis, observed: &Observed) -> Result<TorquePredicti
             torque[run.clone()].copy_from_slice(&needed);
         }
     }
-    (physics.cogging, physics.vibration) = ripples;
-    let phases_unknown = set_phases(&mut physics, observed, &torque, by_rows);
+    torque
+}
 
-    for run in &observed.runs {
-        for i in run.clone() {
-            let motion = &observed.motion;
-            let (x, v, t) = (motion.position[i], motion.velocity(i), observed.time_s[i] - observed.time_s[0]);
-            let cogging = physics.cogging.iter().map(|ripple| seen(ripple, v, motion) * ripple.at(x));
-            let vibration = physics.vibration.iter().map(|ripple| seen(ripple, 1.0, motion) * ripple.at(t));
-            torque[i] += cogging.chain(vibration).sum::<f64>();
-            torque[i] = physics.indicated(torque[i]).clamp(-axis.base.torque_limit, axis.base.torque_limit);
-        }
+/// Puts ripples on what the motor must deliver, and what it cannot deliver off.
+fn add_ripples(axis: &Axis, physics: &Physics, observed: &Observed, torque: &mut [f64]) {
+    let motion = &observed.motion;
+    for i in observed.runs.iter().cloned().flatten() {
+        let (x, v, t) = (motion.position[i], motion.velocity(i), observed.time_s[i] - observed.time_s[0]);
+        let cogging = physics.cogging.iter().map(|ripple| seen(ripple, v, motion) * ripple.at(x));
+        let vibration = physics.vibration.iter().map(|ripple| seen(ripple, 1.0, motion) * ripple.at(t));
+        torque[i] += cogging.chain(vibration).sum::<f64>();
+        torque[i] = physics.indicated(torque[i]).clamp(-axis.base.torque_limit, axis.base.torque_limit);
     }
-    let at_start = torque.first().copied().unwrap_or(f64::NAN);
-    if by_rows != 0.0 {
-        observed.runs.iter().for_each(|run| shift(&mut torque[run.clone()], by_rows, flattened));
-    }
-    Ok(TorquePrediction { torque, at_start, physics, phases_unknown })
 }
 
 /// The share of a ripple that is passed at a speed that the motor must deliver: above the cut-off of the motion the axis gives

@@ -80,13 +80,14 @@ pub fn said_believing(
     said_along((segments, 30.0), effects, [believed, rig], random, change)
 }
 
-/// What is said by slow ways there and back about one place, with a rest after each, and two fast ones.
-pub fn said_of_slow_ways(
-    [believed, rig]: [&Rig; 2],
-    seed: u64,
-    change: impl Fn(&mut Truth),
-) -> (String, Vec<(String, f64)>) {
+/// What is said by slow ways, see [`slow_ways`].
+pub fn said_of_slow_ways(rigs: [&Rig; 2], seed: u64, change: impl Fn(&mut Truth)) -> (String, Vec<(String, f64)>) {
     let mut random = Random::new(seed, 8);
+    said_along(slow_ways(&mut random), Vec::new(), rigs, random, change)
+}
+
+/// Slow ways there and back about one place, with a rest after each, and two fast ones.
+fn slow_ways(random: &mut Random) -> (Vec<Segment>, f64) {
     let mut segments = Vec::new();
     for (way, speed) in
         [(20.0, 120.0), (0.5, 0.5), (0.5, 0.5), (0.6, 1.2), (0.9, 1.2), (1.5, 3.0), (5.0, 8.0), (8.0, 25.0)]
@@ -96,25 +97,49 @@ pub fn said_of_slow_ways(
             segments.push(Segment::Dwell { time: 0.4 });
         }
     }
-    said_along((segments, 40.0), Vec::new(), [believed, rig], random, change)
+    (segments, 40.0)
 }
 
-/// What is said after segments, cut off at a time, s.
-fn said_along(
+/// What `gib predict` says of slow ways by a machine file with these effects.
+pub fn predicted_of_slow_ways(effects: Vec<Value>, rig: &Rig, seed: u64, change: impl Fn(&mut Truth)) -> Value {
+    let mut random = Random::new(seed, 9);
+    let folder = recorded(slow_ways(&mut random), effects, [rig, rig], random, change);
+    let at = |name: &str| folder.path().join(name);
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_gib"));
+    command.args(["predict", "--json", "--machine"]).arg(at("machine.json")).arg("--recording").arg(at("run.csv"));
+    let output = command.arg("--out").arg(at("predicted.csv")).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice::<Value>(&output.stdout).unwrap()["x"].clone()
+}
+
+/// A folder with `run.csv` and `machine.json`: a rig's recording of segments, cut off at a time, s, and what is believed of it.
+fn recorded(
     (segments, time): (Vec<Segment>, f64),
     effects: Vec<Value>,
     [believed, rig]: [&Rig; 2],
     mut random: Random,
     change: impl Fn(&mut Truth),
-) -> (String, Vec<(String, f64)>) {
+) -> tempfile::TempDir {
     let mut truth = Truth::of(rig);
     change(&mut truth);
     let command = moves::sample(10.0, &segments, rig.servo.period, time, 0.02);
     let run = record::run(rig, &truth, &command, 1e-5, &mut random);
     let folder = tempfile::tempdir().unwrap();
+    run.write(rig, &folder.path().join("run.csv")).unwrap();
+    std::fs::write(folder.path().join("machine.json"), believed.machine_file("rig", effects).to_string()).unwrap();
+    folder
+}
+
+/// What is said after segments, cut off at a time, s.
+fn said_along(
+    segments: (Vec<Segment>, f64),
+    effects: Vec<Value>,
+    rigs: [&Rig; 2],
+    random: Random,
+    change: impl Fn(&mut Truth),
+) -> (String, Vec<(String, f64)>) {
+    let folder = recorded(segments, effects, rigs, random, change);
     let at = |name: &str| folder.path().join(name);
-    run.write(rig, &at("run.csv")).unwrap();
-    std::fs::write(at("machine.json"), believed.machine_file("rig", effects).to_string()).unwrap();
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_gib"));
     command.arg("diagnose").arg("--machine").arg(at("machine.json")).arg("--recording").arg(at("run.csv"));
     let output = command.arg("--json").arg(at("said.json")).output().unwrap();

@@ -1,0 +1,36 @@
+//! What a true machine file leaves of a torque that it was not simulated by.
+
+use crate::generated::{Rig, predicted_of_slow_ways, rig};
+use serde_json::json;
+
+/// Torque that is not predicted while the axis moves, over the noise of its sensor.
+fn left_while_moving(figures: &serde_json::Value, rig: &Rig) -> f64 {
+    figures["residual_torque_rms_moving"].as_f64().unwrap() / rig.torque_noise
+}
+
+/// An encoder so fine that what the servo makes of its steps is less than the noise of the torque.
+fn fine() -> Rig {
+    Rig { encoder_step: 1e-4, torque_noise: 0.03, ..rig() }
+}
+
+/// Friction that turns round and an axis that sticks for some rows are too sudden for the motion to tell; the closed loop knows them.
+#[test]
+fn what_turns_round_and_sticks_is_predicted_to_the_noise() {
+    for seed in [51, 52] {
+        let left = left_while_moving(&predicted_of_slow_ways(Vec::new(), &fine(), seed, |_| {}), &fine());
+        println!("seed {seed}: {left:.2} of the noise");
+        assert!((0.9..1.15).contains(&left), "{left}");
+    }
+}
+
+/// Of the closed loop's torque as well the delay counts once.
+#[test]
+fn a_late_or_early_torque_column_is_predicted_as_well() {
+    for (seed, delay_ms) in [(53, 2.0), (54, 1.4), (55, -1.7)] {
+        let late = json!({"cause": "dead_time", "parameters": {"delay_ms": delay_ms}});
+        let figures = predicted_of_slow_ways(vec![late], &fine(), seed, |truth| truth.delay = 1e-3 * delay_ms);
+        let left = left_while_moving(&figures, &fine());
+        println!("seed {seed}, {delay_ms} ms: {left:.2} of the noise");
+        assert!((0.9..1.2).contains(&left), "{left}");
+    }
+}
