@@ -33,8 +33,8 @@ impl Lateness {
         if cycles < 0.99 || (cycles - cycles.round()).abs() > 0.01 {
             return none;
         }
-        let seen = if lag > 0.0 { period / (1.0 - (-period / lag).exp()) } else { period };
         let rate = Self::rate(servo);
+        let seen = if rate > 0.0 { period / (1.0 - (-rate).exp()) } else { period };
         Self { by_sampling_s: seen - 0.5 * period - lag, cycle: Some((period, rate)) }
     }
 

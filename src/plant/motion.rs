@@ -113,9 +113,13 @@ impl Motion {
         let longest = stretches.iter().max_by_key(|s| s.len()).filter(|s| s.len() >= FEWEST_ROWS)?;
         let period_s = (time_s[longest.end - 1] - time_s[longest.start]) / (longest.len() - 1) as f64;
         let pieces: Vec<&[f64]> = stretches.iter().map(|s| &position[s.clone()]).collect();
-        let cutoff_hz = noise_crossing_hz(&pieces, period_s);
+        Some(Self::up_to(noise_crossing_hz(&pieces, period_s), time_s, position, stretches))
+    }
+
+    /// Motion of stretches of rows up to a cut-off, Hz; of one that is too short nothing is known.
+    fn up_to(cutoff_hz: f64, time_s: &[f64], position: &[f64], stretches: &[Range<usize>]) -> Motion {
         // A motion of all rows is taken as it is: long recordings have no room for a copy.
-        let whole = longest.len() == position.len();
+        let whole = stretches.iter().any(|stretch| stretch.len() == position.len());
         let nothing = if whole { Vec::new() } else { vec![f64::NAN; position.len()] };
         let mut motion = Motion { position: nothing, cutoff_hz, resolution: 0.0, pieces: Vec::new() };
         let (mut square, mut rows) = (0.0, 0);
@@ -133,20 +137,14 @@ impl Motion {
             }
         }
         motion.resolution = (square / rows.max(1) as f64).sqrt();
-        Some(motion)
+        motion
     }
 
     /// Motion of other positions in the same stretches, through the same cut-off: as far as this one is known.
     #[must_use]
     pub fn like_this(&self, time_s: &[f64], position: &[f64]) -> Motion {
-        let mut like = Motion { position: vec![f64::NAN; position.len()], pieces: Vec::new(), ..*self };
-        for rows in self.pieces.iter().map(|piece| piece.rows.clone()) {
-            let part = Self::with_cutoff(&time_s[rows.clone()], &position[rows.clone()], Some(self.cutoff_hz));
-            let Some(part) = part else { continue };
-            like.pieces.extend(part.pieces.into_iter().map(|piece| Piece { rows: rows.clone(), ..piece }));
-            like.position[rows].copy_from_slice(&part.position);
-        }
-        like
+        let stretches: Vec<Range<usize>> = self.pieces.iter().map(|piece| piece.rows.clone()).collect();
+        Self { resolution: self.resolution, ..Self::up_to(self.cutoff_hz, time_s, position, &stretches) }
     }
 
     /// The same with a given cut-off, for instance that of the whole recording for one short stretch of it.

@@ -70,6 +70,11 @@ pub fn said_believing(
     change: impl Fn(&mut Truth),
 ) -> (String, Vec<(String, f64)>) {
     let mut random = Random::new(seed, 7);
+    said_along(fast_ways(&mut random), effects, [believed, rig], random, change)
+}
+
+/// Fast ways between a few places, with a short rest after each.
+pub fn fast_ways(random: &mut Random) -> (Vec<Segment>, f64) {
     let mut segments = Vec::new();
     for (to, speed) in
         [(150.0, 200.0), (20.0, 60.0), (90.0, 250.0), (10.0, 120.0), (60.0, 20.0), (180.0, 240.0)].repeat(3)
@@ -77,7 +82,7 @@ pub fn said_believing(
         segments.push(Segment::Move { to: to + random.uniform(-5.0, 5.0), speed, acceleration: 2500.0 });
         segments.push(Segment::Dwell { time: 0.1 });
     }
-    said_along((segments, 30.0), effects, [believed, rig], random, change)
+    (segments, 30.0)
 }
 
 /// What is said by slow ways, see [`slow_ways`].
@@ -87,7 +92,7 @@ pub fn said_of_slow_ways(rigs: [&Rig; 2], seed: u64, change: impl Fn(&mut Truth)
 }
 
 /// Slow ways there and back about one place, with a rest after each, and two fast ones.
-fn slow_ways(random: &mut Random) -> (Vec<Segment>, f64) {
+pub fn slow_ways(random: &mut Random) -> (Vec<Segment>, f64) {
     let mut segments = Vec::new();
     for (way, speed) in
         [(20.0, 120.0), (0.5, 0.5), (0.5, 0.5), (0.6, 1.2), (0.9, 1.2), (1.5, 3.0), (5.0, 8.0), (8.0, 25.0)]
@@ -100,10 +105,16 @@ fn slow_ways(random: &mut Random) -> (Vec<Segment>, f64) {
     (segments, 40.0)
 }
 
-/// What `gib predict` says of slow ways by a machine file with these effects.
-pub fn predicted_of_slow_ways(effects: Vec<Value>, rig: &Rig, seed: u64, change: impl Fn(&mut Truth)) -> Value {
+/// What `gib predict` says of such ways by a machine file with these effects.
+pub fn predicted(
+    ways: fn(&mut Random) -> (Vec<Segment>, f64),
+    effects: Vec<Value>,
+    rig: &Rig,
+    seed: u64,
+    change: impl Fn(&mut Truth),
+) -> Value {
     let mut random = Random::new(seed, 9);
-    let folder = recorded(slow_ways(&mut random), effects, [rig, rig], random, change);
+    let folder = recorded(ways(&mut random), effects, [rig, rig], random, change);
     let at = |name: &str| folder.path().join(name);
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_gib"));
     command.args(["predict", "--json", "--machine"]).arg(at("machine.json")).arg("--recording").arg(at("run.csv"));
