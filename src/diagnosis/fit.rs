@@ -5,6 +5,7 @@
 //! what is left (`refine`).
 
 mod beside;
+mod few;
 mod given;
 mod refine;
 mod slopes;

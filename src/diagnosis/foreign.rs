@@ -17,6 +17,9 @@ const MOST: f64 = 0.5;
 const LEAST: f64 = 0.3;
 /// What a law without a name must bring to take the place of as many causes; fewer it replaces where it is as good.
 const FOR_AS_MANY: f64 = LEAST_GAIN;
+/// Rows that show whether a law explains as much, and how much of that share a law shows there.
+const GLIMPSE: usize = 3000;
+const SHOWN_AT_A_GLIMPSE: f64 = 0.5;
 /// How often the way between two places is halved.
 const HALVED: i32 = 5;
 /// Most causes that are compared with no law of any form where they leave little.
@@ -33,9 +36,13 @@ const STAGE: &str = "comparing with laws without a name";
 pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Result<Option<&'static str>, Stopped> {
     let explained = (empty.squares() - found.squares()).max(1e-300);
     let beside = |law: &Foreign, place: f64| bench.beside((law.regressors)(bench.frame, place));
+    let every = bench.rows.div_ceil(GLIMPSE).max(1);
+    let frame = bench.frame.few(every);
+    let few = bench.of_few(&frame, every);
+    let explained_there = (empty.squares_of_few(every) - found.squares_of_few(every)).max(1e-300);
     let first_place = |law: &&'static Foreign| {
         let places = if law.somewhere { 1..PLACES } else { 0..1 };
-        let alike = |place: f64| bench.taken_by((law.regressors)(bench.frame, place)) / explained;
+        let alike = |place: f64| few.taken_by((law.regressors)(&frame, place)) / explained_there;
         let tried = places.map(|place| place as f64 / PLACES as f64).map(|place| (alike(place), *law, place));
         tried.max_by(|a, b| a.0.total_cmp(&b.0))
     };
@@ -46,6 +53,11 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
     laws.sort_by_key(|law| !law.somewhere);
     let mut near: Vec<(f64, &'static Foreign, f64)> =
         watch.each(&laws, (0.9, 0.91), STAGE, first_place)?.into_iter().flatten().collect();
+    near.retain(|(share, ..)| *share > SHOWN_AT_A_GLIMPSE * LEAST);
+    let in_all_rows = |&(_, law, place): &(f64, &'static Foreign, f64)| {
+        (bench.taken_by((law.regressors)(bench.frame, place)) / explained, law, place)
+    };
+    near = watch.each(&near, (0.91, 0.91), STAGE, in_all_rows)?;
     near.retain(|(share, ..)| *share > LEAST);
     near.sort_by(|a, b| a.1.takes_any_form().cmp(&b.1.takes_any_form()).then(b.0.total_cmp(&a.0)));
     for (_, law, place) in near {

@@ -245,6 +245,18 @@ impl<'a> Frame<'a> {
         Self { axis, belief: axis.belief(), believed_late_s, ..self.clone() }
     }
 
+    /// One judged row in so many, as it is: for what is smooth over the filter.
+    #[must_use]
+    pub fn few(&self, every: usize) -> Self {
+        fn of<T: Copy>(all: &[T], every: usize) -> Vec<T> {
+            all.iter().step_by(every).copied().collect()
+        }
+        let (kept, weights) = (of(&self.kept, every), of(&self.weights, every));
+        let (acceleration, speed) = (of(&self.acceleration, every), of(&self.speed, every));
+        let blocks = (0..=BLOCKS).map(|b| b * kept.len() / BLOCKS).collect();
+        Self { kept, weights, acceleration, speed, blocks, kernel: vec![1.0], ..self.clone() }
+    }
+
     /// A regressor of every row, filtered like the torque, at the judged rows.
     #[must_use]
     pub fn judged(&self, values: &[f64]) -> Vec<f64> {
@@ -322,6 +334,9 @@ impl<'a> Frame<'a> {
     /// The regressor that a function of the row gives.
     #[must_use]
     pub fn judged_by(&self, value: impl Fn(usize) -> f64) -> Vec<f64> {
+        if self.kernel == [1.0] {
+            return self.kept.iter().map(|&row| value(row)).collect();
+        }
         self.judged(&(0..self.x.len()).map(value).collect::<Vec<_>>())
     }
 

@@ -5,7 +5,7 @@ use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
 use super::progress::{Stopped, Watch};
 use super::replayed;
-use crate::machine::Axis;
+use crate::machine::{Axis, Cause};
 use crate::plant::added::ByServo;
 use crate::plant::closed_loop::{Manner, predict_by};
 use crate::plant::observed::Observed;
@@ -45,9 +45,14 @@ pub struct Replay {
     pub error: Vec<f64>,
 }
 
+/// How many times longer than usual the plant steps are: the position goes with it by some nanometres at most.
+const COARSER: f64 = 4.0;
+
 /// The errors of a machine on a recording; `None` where nothing can be predicted.
 pub(super) fn errors(axis: &Axis, observed: &Observed, servo: &ByServo) -> Option<Errors> {
-    let prediction = predict_by(axis, observed, servo).ok()?;
+    // Friction that builds up swings on a stiffness of its own.
+    let builds_up = axis.effects.iter().any(|effect| effect.cause() == Cause::PreslidingFriction);
+    let prediction = predict_by(axis, observed, servo, if builds_up { 1.0 } else { COARSER }).ok()?;
     let less =
         |measured: &[f64], model: &[f64]| -> Vec<f64> { measured.iter().zip(model).map(|(m, p)| m - p).collect() };
     let replayed = prediction.closed_loop.as_ref();

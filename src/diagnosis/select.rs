@@ -18,12 +18,13 @@ use super::progress::{Stopped, Watch};
 use super::shrink::{idle_left_out, shrink};
 use super::valleys;
 use crate::machine::Cause;
+use once_cell::sync::OnceCell;
 use std::collections::{HashMap, HashSet};
 
 mod noise;
 mod starts;
 
-use starts::{Child, at_best_starts, at_seldom_starts};
+use starts::{Child, at_best_starts, at_seldom_starts, seldom_starts};
 
 /// Sets that are carried on.
 const BEAM: usize = 2;
@@ -31,6 +32,8 @@ const BEAM: usize = 2;
 const TRIED: usize = 6;
 /// Most causes in a set.
 const MOST: usize = 6;
+/// Most bytes that the seldom starts of a law are kept in; of a longer recording they are made anew for each set.
+const ROOM: usize = 64 << 20;
 /// Starts of a law that are laid out in one go; tables are stepped half as many side by side.
 const AT_A_TIME: usize = 16;
 /// Least gain of a cause in Σ ln(mean square): 8 % of what is left. A smaller one would not be worth a machinist's time,
@@ -38,6 +41,10 @@ const AT_A_TIME: usize = 16;
 pub const LEAST_GAIN: f64 = 0.08;
 /// What a further fitted number must gain where sets of causes compete.
 pub const NUMBER_PRICE: f64 = 0.003;
+
+/// Share of what the belief leaves above noise up to which a law that leaves little is no imitation of a table: such a one leaves a
+/// tenth and more.
+const NO_IMITATION: f64 = 0.05;
 
 /// Squares over those that a set must come down to at which it is not refined any more.
 const FAR_OFF: f64 = 2.0;
@@ -75,6 +82,9 @@ pub struct Search<'s, 'f, 'a> {
     approach: Approach<'f, 'a>,
     laws: &'s [&'static Law],
     shelf: Shelf,
+    /// That of tables, which are simulated once somebody asks for them, and of their seldom starts.
+    tables: OnceCell<Shelf>,
+    seldom: OnceCell<Shelf>,
     watch: &'s Watch<'s>,
 }
 
@@ -85,7 +95,32 @@ impl<'s, 'f, 'a> Search<'s, 'f, 'a> {
     /// [`Stopped`] when the watch's caller said so.
     pub fn new(bench: &'s Bench<'f, 'a>, laws: &'s [&'static Law], watch: &'s Watch<'s>) -> Result<Self, Stopped> {
         let approach = Approach::new(bench);
-        Ok(Self { bench, laws, shelf: shelf(bench, &approach, laws, watch)?, approach, watch })
+        let empty = bench.fit(Vec::new());
+        let by_rows = laws.iter().filter(|law| !law.is_simulated());
+        let shelf = shelf(bench, &approach, by_rows.map(|law| (*law, bench.starts(law, &empty))), watch)?;
+        Ok(Self { bench, laws, shelf, tables: OnceCell::new(), seldom: OnceCell::new(), approach, watch })
+    }
+
+    /// Lays out what tables would do, unless that is done.
+    fn lay_out_tables(&self) -> Result<(), Stopped> {
+        let empty = self.bench.fit(Vec::new());
+        let tables = self.laws.iter().filter(|law| law.is_simulated());
+        let starts = tables.map(|law| (*law, self.bench.starts(law, &empty)));
+        self.tables.get_or_try_init(|| shelf(self.bench, &self.approach, starts, self.watch)).map(|_| ())
+    }
+
+    /// The same of seldom starts, of those that there is room for.
+    fn lay_out_seldom(&self) -> Result<(), Stopped> {
+        let empty = self.bench.fit(Vec::new());
+        let starts = self.laws.iter().map(|law| (*law, seldom_starts(self.bench, &empty, law)));
+        let row = self.bench.measured.len() * size_of::<f64>();
+        let starts = starts.filter(|(_, shapes)| shapes.len() * row < ROOM);
+        self.seldom.get_or_try_init(|| shelf(self.bench, &self.approach, starts, self.watch)).map(|_| ())
+    }
+
+    /// Terms at the starts of a law.
+    fn shelved(&self, law: &Law) -> &[Part] {
+        self.shelf.get(&law.cause).or_else(|| self.tables.get()?.get(&law.cause)).map_or(&[], Vec::as_slice)
     }
 
     /// The causes that explain most beside the belief as it is.
@@ -113,13 +148,16 @@ impl<'s, 'f, 'a> Search<'s, 'f, 'a> {
     }
 }
 
-fn shelf(bench: &Bench, approach: &Approach, laws: &[&'static Law], watch: &Watch) -> Result<Shelf, Stopped> {
-    let empty = bench.fit(Vec::new());
+fn shelf(
+    bench: &Bench,
+    approach: &Approach,
+    starts: impl Iterator<Item = (&'static Law, Vec<Vec<f64>>)>,
+    watch: &Watch,
+) -> Result<Shelf, Stopped> {
     // Few starts at a time, so that all cores have work on the laws that take long.
-    let starts: Vec<(&'static Law, Vec<Vec<f64>>)> = laws
-        .iter()
-        .filter(|law| !law.manner.starts_from_rest)
-        .flat_map(|&law| bench.starts(law, &empty).chunks(AT_A_TIME).map(|c| (law, c.to_vec())).collect::<Vec<_>>())
+    let starts: Vec<(&'static Law, Vec<Vec<f64>>)> = starts
+        .filter(|(law, _)| !law.manner.starts_from_rest)
+        .flat_map(|(law, starts)| starts.chunks(AT_A_TIME).map(|c| (law, c.to_vec())).collect::<Vec<_>>())
         .collect();
     let laid = watch.each(&starts, (0.05, 0.15), "laying out what each cause would do", |(law, shapes)| {
         (
@@ -248,21 +286,28 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
     let stood_in: Vec<Fit> = beam.iter().take(1).filter_map(|set| without_stand_in(bench, set)).collect();
     let in_its_place = |set| laws.iter().filter(|law| law.is_simulated()).map(move |law| (set, *law));
     let open = open.chain(stood_in.iter().flat_map(in_its_place));
+    let (tables, by_rows): (Vec<_>, Vec<_>) = open.partition(|(_, law): &(&Fit, &Law)| law.is_simulated());
+    let at = |share: f64| from + share * (to - from);
+    let mut children = look(search, &by_rows, (from, at(0.25)))?;
     // Simulations take longest. Beside causes without one they are asked where no law that is worked out row by row is to be
     // carried on and halves what is left, or leaves little: beside one that is they are asked next, which shows what only
-    // imitates them.
-    let asked_last = beam.iter().all(|set| !set.parts.is_empty() && set.table().is_none());
-    let (mut first, last): (Vec<_>, Vec<_>) =
-        open.partition(|(_, law): &(&Fit, &Law)| !(asked_last && law.is_simulated()));
-    // What takes longest is begun first, lest a core have nothing left to do beside it.
-    first.sort_by_key(|(_, law)| !law.manner.approached);
-    let half = if last.is_empty() { to } else { 0.5 * (from + to) };
-    let mut grown = with_one_more(search, &first, &[], (from, half))?;
+    // imitates them. Beside none they are asked unless such a law by itself cannot be an imitation.
+    let first = beam.iter().all(|set| set.parts.is_empty());
+    let asked_last = !first && beam.iter().all(|set| !set.parts.is_empty() && set.table().is_none());
+    let needless = tables.is_empty() || first && tells_by_itself(bench, &children);
+    let both: Vec<_> = by_rows.iter().chain(&tables).copied().collect();
+    let mut grown = if asked_last || needless {
+        with_one_more(search, (&by_rows, children), &[], (at(0.25), at(0.5)))?
+    } else {
+        children.extend(look(search, &tables, (at(0.25), at(0.5)))?);
+        with_one_more(search, (&both, children), &[], (at(0.5), to))?
+    };
     let so_far = beam.iter().map(price).fold(f64::INFINITY, f64::min);
     let leaves_little = |fit: &Fit| Excess::of(bench, fit, fit).largest() < LITTLE_LEFT;
     let suffices = |fit: &Fit| is_more(so_far, fit) && (beam.iter().all(|set| fit.halves(set)) || leaves_little(fit));
-    if !last.is_empty() && !grown.first().is_some_and(suffices) {
-        let more = with_one_more(search, &last, &grown, (half, to))?;
+    if asked_last && !needless && !grown.first().is_some_and(suffices) {
+        let children = look(search, &tables, (at(0.5), at(0.75)))?;
+        let more = with_one_more(search, (&tables, children), &grown, (at(0.75), to))?;
         grown.extend(more);
         sort_by_price(&mut grown);
     }
@@ -291,19 +336,43 @@ fn without_stand_in(bench: &Bench, set: &Fit) -> Option<Fit> {
     (set.table().is_none() && set.parts.len() > 1).then(|| bench.without(set, at))
 }
 
+/// Whether the best of laws that are worked out row by row explains so much by itself that it is no imitation of a table, and no law
+/// that is confused with one.
+fn tells_by_itself(bench: &Bench, children: &[Child]) -> bool {
+    let Some(best) = children.iter().min_by(|a, b| a.price.total_cmp(&b.price)) else { return false };
+    let law = best.part.law;
+    let of_tables = law.confused_with.iter().any(|cause| super::causes::law(*cause).is_simulated());
+    let before = Excess::of(bench, best.set, best.set).largest();
+    let explains = |fit: &Fit| {
+        let left = Excess::of(bench, fit, fit).largest();
+        left < LITTLE_LEFT && left < NO_IMITATION * before
+    };
+    !of_tables && explains(&best.refined(bench, f64::INFINITY))
+}
+
+/// Each of these laws at its best start beside its set, most promising first.
+fn look<'s>(
+    search: &Search,
+    open: &[(&'s Fit, &'static Law)],
+    (from, to): (f64, f64),
+) -> Result<Vec<Child<'s>>, Stopped> {
+    let Search { bench, watch, .. } = search;
+    if open.iter().any(|(_, law)| law.is_simulated()) {
+        search.lay_out_tables()?;
+    }
+    let much_left = cheapest(open.iter().map(|(set, _)| *set)).is_some_and(|best| leaves_much(bench, best));
+    let at_start = |&(set, law): &(_, _)| at_best_starts(search, set, law, much_left);
+    Ok(watch.each(open, (from, to), "looking for causes", at_start)?.into_iter().flatten().collect())
+}
+
 /// The sets with each of these laws added that may come among the best beside others: those that are worth it, best first.
 fn with_one_more(
     search: &Search,
-    open: &[(&Fit, &'static Law)],
+    (open, mut children): (&[(&Fit, &'static Law)], Vec<Child>),
     others: &[Fit],
     (from, to): (f64, f64),
 ) -> Result<Vec<Fit>, Stopped> {
     let Search { bench, watch, .. } = search;
-    let half = 0.5 * (from + to);
-    let much_left = cheapest(open.iter().map(|(set, _)| *set)).is_some_and(|best| leaves_much(bench, best));
-    let look = |&(set, law): &(_, _)| at_best_starts(search, set, law, much_left);
-    let mut children: Vec<Child> =
-        watch.each(open, (from, half), "looking for causes", look)?.into_iter().flatten().collect();
     children.sort_by(|a, b| a.price.total_cmp(&b.price));
     // Two sets may grow into the same one, which is refined once, from where it costs less.
     let mut seen = HashSet::new();
@@ -320,14 +389,17 @@ fn with_one_more(
         *count <= TRIED && child.within_reach(most) < carried_on
     });
     children.sort_by_key(|child| !child.part.law.is_simulated());
-    let mut fits = watch.each(&children, (half, to), FITTING, |child| child.refined(bench, child.set.squares()))?;
+    let mut fits = watch.each(&children, (from, to), FITTING, |child| child.refined(bench, child.set.squares()))?;
     let sound = fits.iter().filter(|fit| is_physical(bench, fit));
     let best = cheapest(sound.chain(others).chain(open.iter().map(|(set, _)| *set)));
     if let Some(best) = best.filter(|best| leaves_much(bench, best)) {
         let rare: Vec<_> = open.iter().filter(|(_, law)| law.manner.seldom.is_some()).collect();
+        if !rare.is_empty() {
+            search.lay_out_seldom()?;
+        }
         let before = price(best);
         let begun = watch.each(&rare, (to, to), FITTING, |(set, law)| {
-            let child = at_seldom_starts(bench, set, law).filter(|child| child.within_reach(most) < before)?;
+            let child = at_seldom_starts(search, set, law).filter(|child| child.within_reach(most) < before)?;
             Some((child.refined(bench, best.squares()), child))
         })?;
         let (more_fits, more): (Vec<_>, Vec<_>) = begun.into_iter().flatten().unzip();

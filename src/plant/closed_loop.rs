@@ -44,7 +44,7 @@ pub struct Prediction {
 /// # Errors
 /// As [`predict_torque`], and a servo period that does not suit the recording.
 pub fn predict(axis: &Axis, observed: &Observed) -> Result<Prediction, String> {
-    predict_by(axis, observed, &ByServo::of(axis, observed))
+    predict_by(axis, observed, &ByServo::of(axis, observed), 1.0)
 }
 
 /// The same without the simulated table. The recorded one is dropped once its torque is known: long recordings have no room
@@ -55,15 +55,15 @@ pub fn predict(axis: &Axis, observed: &Observed) -> Result<Prediction, String> {
 pub fn predict_motor(axis: &Axis, observed: &mut Observed) -> Result<Prediction, String> {
     let torque = predict_torque(axis, observed)?;
     observed.table_position = None;
-    replayed(axis, observed, torque, &ByServo::of(axis, observed))
+    replayed(axis, observed, torque, &ByServo::of(axis, observed), 1.0)
 }
 
-/// [`predict`] by what is known of the servo.
+/// [`predict`] by what is known of the servo, in plant steps so many times longer than usual.
 ///
 /// # Errors
 /// As [`predict`].
-pub fn predict_by(axis: &Axis, observed: &Observed, servo: &ByServo) -> Result<Prediction, String> {
-    replayed(axis, observed, predict_torque(axis, observed)?, servo)
+pub fn predict_by(axis: &Axis, observed: &Observed, servo: &ByServo, coarser: f64) -> Result<Prediction, String> {
+    replayed(axis, observed, predict_torque(axis, observed)?, servo, coarser)
 }
 
 fn replayed(
@@ -71,10 +71,12 @@ fn replayed(
     observed: &Observed,
     mut torque: TorquePrediction,
     servo: &ByServo,
+    coarser: f64,
 ) -> Result<Prediction, String> {
+    let whole = Part { coarser, ..Part::whole(observed) };
     let rest = later(rows_at_rest(observed), torque.physics.delay_s / observed.period_s, observed.time_s.len());
-    let begun = Begun::of(axis, observed, &mut torque, servo)?;
-    let replay = |speed, added| Replay::felt(axis, observed, &torque, speed, added);
+    let begun = Begun::of(axis, observed, &mut torque, servo, whole)?;
+    let replay = |speed, added| Replay::felt(axis, observed, &torque, speed, added, whole);
     let mut best = replay(CommandSpeed::Central, servo.added[0].as_ref())?;
     if servo.speed != CommandSpeed::Central {
         let other = replay(servo.speed, servo.added[1].as_ref())?;
@@ -229,10 +231,11 @@ impl Begun {
         observed: &Observed,
         torque: &mut TorquePrediction,
         servo: &ByServo,
+        whole: Part,
     ) -> Result<Option<Self>, String> {
         let (Some(held), Some(law)) = (servo.held_at_start, &axis.servo) else { return Ok(None) };
         let rows = rows_of_the_beginning(law, observed);
-        let part = Part { rows, ..Part::whole(observed) };
+        let part = Part { rows, ..whole };
         let first = [0..rows];
         let begins = |torque: &TorquePrediction, rows: &[Range<usize>]| {
             replay(axis, observed, torque, rows, &[], servo.speed, part)
@@ -280,8 +283,9 @@ impl<'s> Replay<'s> {
         torque: &TorquePrediction,
         command_speed: CommandSpeed,
         added: Option<&'s Added>,
+        whole: Part,
     ) -> Result<Option<Self>, String> {
-        let (whole, all) = (Part::whole(observed), [0..observed.time_s.len()]);
+        let all = [0..observed.time_s.len()];
         let Some((replayed, torque_alone)) = replay(axis, observed, torque, &all, &[], command_speed, whole)? else {
             return Ok(None);
         };

@@ -66,8 +66,8 @@ impl<'s> Child<'s> {
 /// `much_left` says whether the best of the sets leaves much.
 #[must_use]
 pub fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law, much_left: bool) -> Vec<Child<'s>> {
-    let Search { bench, approach, shelf, .. } = search;
-    let shelved = || shelf.get(&law.cause).map_or(&[][..], Vec::as_slice);
+    let Search { bench, approach, .. } = search;
+    let shelved = || search.shelved(law);
     let fresh: Vec<Part>;
     let parts: &[Part] = if law.manner.approached {
         fresh = bench.parts(law, approach.from(shelved(), set).into_iter().collect());
@@ -113,12 +113,22 @@ fn numbers(part: &Part) -> f64 {
     NUMBER_PRICE * part.free_parameters() as f64
 }
 
+/// The seldom starts of a law beside a set; none where it has none.
+#[must_use]
+pub fn seldom_starts(bench: &Bench, set: &Fit, law: &Law) -> Vec<Vec<f64>> {
+    let Some(seldom) = law.manner.seldom else { return Vec::new() };
+    bench.starts(law, set).iter().flat_map(|shape| seldom(shape)).collect()
+}
+
 /// A law at the best of its seldom starts beside a set, if that is worth refining.
 #[must_use]
-pub fn at_seldom_starts<'s>(bench: &Bench, set: &'s Fit, law: &'static Law) -> Option<Child<'s>> {
-    let seldom = law.manner.seldom?;
-    let parts = bench.parts(law, bench.starts(law, set).iter().flat_map(|shape| seldom(shape)).collect());
-    let rated = parts.iter().map(|part| (figure(&bench.joined(set, part)) + numbers(part), part));
+pub fn at_seldom_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law) -> Option<Child<'s>> {
+    let bench = search.bench;
+    let laid_out = search.seldom.get().and_then(|shelf| shelf.get(&law.cause)).map_or(&[][..], Vec::as_slice);
+    let mut missing = seldom_starts(bench, set, law);
+    missing.retain(|shape| !laid_out.iter().any(|part| part.shape == *shape));
+    let made = bench.parts(law, missing);
+    let rated = laid_out.iter().chain(&made).map(|part| (figure(&bench.joined(set, part)) + numbers(part), part));
     let (figure, part) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
     (figure < set.figure() - LEAST_AT_START).then(|| Child::new(set, part, figure, None))
 }
