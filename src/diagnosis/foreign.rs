@@ -35,7 +35,6 @@ const STAGE: &str = "comparing with laws without a name";
 /// [`Stopped`] when the watch's caller said so.
 pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Result<Option<&'static str>, Stopped> {
     let explained = (empty.squares() - found.squares()).max(1e-300);
-    let beside = |law: &Foreign, place: f64| bench.beside((law.regressors)(bench.frame, place));
     let every = bench.rows.div_ceil(GLIMPSE).max(1);
     let frame = bench.frame.few(every);
     let few = bench.of_few(&frame, every);
@@ -60,22 +59,18 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
     near = watch.each(&near, (0.91, 0.91), STAGE, in_all_rows)?;
     near.retain(|(share, ..)| *share > LEAST);
     near.sort_by(|a, b| a.1.takes_any_form().cmp(&b.1.takes_any_form()).then(b.0.total_cmp(&a.0)));
+    let parts: Vec<Part> = found.parts.iter().map(|part| part.of_few(bench.rows, every)).collect();
     for (_, law, place) in near {
-        let at_place = |place: f64| {
-            let with = beside(law, place);
-            let fit = with.fit(&found.parts);
-            (with, fit)
-        };
-        let (mut at, (mut with, mut fit)) = (place, at_place(place));
+        let squares = |place: &f64| few.beside((law.regressors)(&frame, *place)).fit(&parts).squares();
+        let mut best = (place, squares(&place));
         for halved in 1..=if law.somewhere { HALVED } else { 0 } {
             let step = 0.5f64.powi(halved) / PLACES as f64;
-            let sides = watch.each(&[at - step, at + step], (0.91, 0.91), STAGE, |place| (*place, at_place(*place)))?;
-            for (place, (there, nearer)) in sides {
-                if nearer.squares() < fit.squares() {
-                    (at, with, fit) = (place, there, nearer);
-                }
-            }
+            let sides = [best.0 - step, best.0 + step];
+            let nearer = watch.each(&sides, (0.91, 0.91), STAGE, |place| (*place, squares(place)))?;
+            best = nearer.into_iter().fold(best, |best, side| if side.1 < best.1 { side } else { best });
         }
+        let with = bench.beside((law.regressors)(bench.frame, best.0));
+        let fit = with.fit(&found.parts);
         let left = idle_left_out(&with.bench, fit, watch)?;
         let needless = found.parts.len() - left.parts.len();
         let better = price(found) - price(&left) - NUMBER_PRICE * law.numbers as f64;

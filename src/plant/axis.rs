@@ -15,19 +15,25 @@ use crate::machine::TwoMasses;
 /// An axis's body, in the motor's coordinate.
 #[derive(Debug, Clone)]
 pub struct Body {
-    physics: Physics,
+    laws: Laws,
     time_constant_s: f64,
-    load_per_motor: f64,
     pace: Pace,
     /// Longest step while flanks are calm, s; `None` where they are never told to be.
     calm_step_s: Option<f64>,
     /// Whether they were in the last steps.
     calm: bool,
     plain: bool,
-    viscous: f64,
     /// Of motor and table.
     held: [Held; 2],
     state: State,
+}
+
+/// What makes a body move, and stays the same.
+#[derive(Debug, Clone)]
+struct Laws {
+    physics: Physics,
+    load_per_motor: f64,
+    viscous: f64,
 }
 
 /// A plant step.
@@ -47,7 +53,7 @@ impl Pace {
 }
 
 /// What no register can hold of a mass.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 struct Held {
     /// The torques near where it is.
     near: Nearby,
@@ -140,7 +146,8 @@ impl Body {
         let state = State { time_s: 0.0, torque, motor, table };
         let pace = Pace::new(step_s, time_constant_s);
         let calm_step_s = calm_step_s.filter(|calm| *calm > step_s);
-        Body { physics, time_constant_s, load_per_motor, pace, calm_step_s, calm: false, plain, viscous, held, state }
+        let laws = Laws { physics, load_per_motor, viscous };
+        Body { laws, time_constant_s, pace, calm_step_s, calm: false, plain, held, state }
     }
 
     /// Advances by `steps` plant steps while the servo asks for `asked`.
@@ -162,35 +169,60 @@ impl Body {
     /// Steps at a pace; `FLANKS` says whether it is to be known if they are calm.
     fn step<const FLANKS: bool>(&mut self, asked: f64, steps: usize, pace: Pace) {
         let mut state = self.state;
-        let mut held = std::mem::take(&mut self.held);
-        let own = &mut held;
+        let (laws, own) = (&self.laws, &mut self.held);
         let mut leaning = Leaning::default();
-        match (&self.physics.two_masses, self.plain) {
-            (None, true) => (0..steps).for_each(|_| self.rigid_step::<true>(pace, own, &mut state, asked)),
-            (None, false) => (0..steps).for_each(|_| self.rigid_step::<false>(pace, own, &mut state, asked)),
+        match (&laws.physics.two_masses, self.plain) {
+            (None, true) => (0..steps).for_each(|_| laws.rigid_step::<true>(pace, own, &mut state, asked)),
+            (None, false) => (0..steps).for_each(|_| laws.rigid_step::<false>(pace, own, &mut state, asked)),
             (Some(m), true) => (0..steps).for_each(|_| {
-                let carried = self.two_mass_step::<true>(m, pace, own, &mut state, asked);
+                let carried = laws.two_mass_step::<true>(m, pace, own, &mut state, asked);
                 if FLANKS {
                     leaning.add(carried.torque, carried.rate, carried.speeds);
                 }
             }),
             (Some(m), false) => (0..steps).for_each(|_| {
-                let carried = self.two_mass_step::<false>(m, pace, own, &mut state, asked);
+                let carried = laws.two_mass_step::<false>(m, pace, own, &mut state, asked);
                 if FLANKS {
                     leaning.add(carried.torque, carried.rate, carried.speeds);
                 }
             }),
         }
-        (self.state, self.held) = (state, held);
-        if let Some(masses) = self.physics.two_masses.filter(|_| FLANKS && steps > 0) {
+        self.state = state;
+        if let Some(masses) = self.laws.physics.two_masses.filter(|_| FLANKS && steps > 0) {
             let both = masses.motor_inertia + masses.table_inertia;
             self.calm = leaning.is_calm(&masses, masses.motor_inertia * masses.table_inertia / both);
         }
     }
 
+    /// Motor position, motor's coordinate.
+    #[must_use]
+    pub fn motor_position(&self) -> f64 {
+        self.state.motor.position
+    }
+
+    /// Table position before any error of the screw, in the motor's coordinate.
+    #[must_use]
+    pub fn table_position(&self) -> f64 {
+        if self.laws.physics.two_masses.is_some() { self.state.table.position } else { self.state.motor.position }
+    }
+
+    /// Motor speed, motor's coordinate per second.
+    #[must_use]
+    pub fn motor_velocity(&self) -> f64 {
+        self.state.motor.velocity
+    }
+
+    /// What the motor's current says, drive's own unit.
+    #[must_use]
+    pub fn torque(&self) -> f64 {
+        self.state.torque
+    }
+}
+
+impl Laws {
     /// Mean torque of the motor over a step.
     #[inline(always)]
-    fn motor_torque(&self, pace: Pace, state: &mut State, asked: f64) -> f64 {
+    fn motor_torque(pace: Pace, state: &mut State, asked: f64) -> f64 {
         let excess = state.torque - asked;
         state.torque = asked + excess * pace.lag.0;
         asked + excess * pace.lag.1
@@ -199,7 +231,7 @@ impl Body {
     #[inline(always)]
     fn rigid_step<const PLAIN: bool>(&self, pace: Pace, [own, _]: &mut [Held; 2], state: &mut State, asked: f64) {
         let (h, p) = (pace.step_s, &self.physics);
-        let torque = self.motor_torque(pace, state, asked);
+        let torque = Self::motor_torque(pace, state, asked);
         let m = &mut state.motor;
         let middle = m.middle(h);
         if PLAIN {
@@ -223,7 +255,7 @@ impl Body {
         asked: f64,
     ) -> Carried {
         let (h, p) = (pace.step_s, &self.physics);
-        let torque = self.motor_torque(pace, state, asked);
+        let torque = Self::motor_torque(pace, state, asked);
         let (motor, table) = (&mut state.motor, &mut state.table);
         let (motor_middle, table_middle) = (motor.middle(h), table.middle(h));
         let (rate, speed) = (motor.velocity - table.velocity, table.velocity);
@@ -244,29 +276,5 @@ impl Body {
         }
         state.time_s += h;
         Carried { torque: push, rate, speeds: [speed, table.velocity] }
-    }
-
-    /// Motor position, motor's coordinate.
-    #[must_use]
-    pub fn motor_position(&self) -> f64 {
-        self.state.motor.position
-    }
-
-    /// Table position before any error of the screw, in the motor's coordinate.
-    #[must_use]
-    pub fn table_position(&self) -> f64 {
-        if self.physics.two_masses.is_some() { self.state.table.position } else { self.state.motor.position }
-    }
-
-    /// Motor speed, motor's coordinate per second.
-    #[must_use]
-    pub fn motor_velocity(&self) -> f64 {
-        self.state.motor.velocity
-    }
-
-    /// What the motor's current says, drive's own unit.
-    #[must_use]
-    pub fn torque(&self) -> f64 {
-        self.state.torque
     }
 }

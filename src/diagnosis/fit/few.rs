@@ -1,8 +1,9 @@
 //! The same equations of few of their rows: enough to see how much a law explains, in a fraction of the time.
 
 use super::beside::orthonormalised;
-use super::{Bench, Fit, dot};
+use super::{Bench, Fit, Part, dot};
 use crate::diagnosis::frame::Frame;
+use std::sync::Arc;
 
 impl Bench<'_, '_> {
     /// These equations of one judged row in so many, on the frame of those ([`Frame::few`]).
@@ -19,6 +20,19 @@ impl Bench<'_, '_> {
         let (floors, resistance) = (self.floors, self.resistance.clone());
         let rows = frame.kept.len();
         Bench { frame, measured, floors, doubt, certain, rows, free, resistance, windows: Vec::new() }
+    }
+}
+
+impl Part {
+    /// The same of equations of one row in so many.
+    #[must_use]
+    pub fn of_few(&self, rows: usize, every: usize) -> Self {
+        Part {
+            fixed: self.fixed.as_deref().map(|fixed| few(fixed, rows, every).into()),
+            columns: self.columns.iter().map(|column| few(column, rows, every)).collect(),
+            sides: Arc::default(),
+            ..self.clone()
+        }
     }
 }
 
