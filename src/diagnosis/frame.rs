@@ -227,8 +227,8 @@ impl<'a> Frame<'a> {
             torque_kernel,
             low_pass_kernel,
         };
-        frame.unseen = grids::unseen_by_floor(&frame);
-        frame.grids_in_table = grids::in_table(&frame);
+        (frame.unseen, frame.grids_in_table) =
+            rayon::join(|| grids::unseen_by_floor(&frame), || grids::in_table(&frame));
         frame
     }
 

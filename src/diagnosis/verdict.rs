@@ -141,23 +141,27 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
     // Between a motor that winds up its drive and one that drags bristles these rows do not tell.
     const YIELDING: [Cause; 3] = [Cause::PreslidingFriction, Cause::DriveCompliance, Cause::Backlash];
     let told = found.findings.iter().any(|finding| YIELDING.contains(&finding.effect.cause()));
-    if !told && belief::may_be_found(axis, Cause::PreslidingFriction) {
-        if let Some(way) = creep::way(&first) {
-            let frame = without_swings(Frame::yielding_over(&base, &columns, None, way));
-            if creep::promises(&frame, way, &found) {
-                let again = answer(&recorded, &frame, notes.clone())?;
-                if creep::is_over(way, again.findings.iter().map(|finding| finding.effect)) {
-                    return watch.at(1.0, "done").map(|()| again);
-                }
+    let yields = !told && belief::may_be_found(axis, Cause::PreslidingFriction);
+    let look_wider = |frame: &Frame| without_swings(Frame::new(&base, &columns, Some(quiet::wider(frame))));
+    let (way, mut wider) = rayon::join(
+        || yields.then(|| creep::way(&first)).flatten(),
+        || may_hide_more(&found).then(|| look_wider(&first)),
+    );
+    if let Some(way) = way {
+        let frame = without_swings(Frame::yielding_over(&base, &columns, None, way));
+        if creep::promises(&frame, way, &found) {
+            let again = answer(&recorded, &frame, notes.clone())?;
+            if creep::is_over(way, again.findings.iter().map(|finding| finding.effect)) {
+                return watch.at(1.0, "done").map(|()| again);
             }
         }
     }
     let (mut frame, mut heard, mut by_first) = (first.clone(), None, true);
     for _ in 0..quiet::MOST {
-        if !matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained | Verdict::UnknownCause) {
+        if !may_hide_more(&found) {
             break;
         }
-        let wide = without_swings(Frame::new(&base, &columns, Some(quiet::wider(&frame))));
+        let wide = wider.take().unwrap_or_else(|| look_wider(&frame));
         // What was heard once is asked again whether that is quieter or not.
         if !what_is_missing(&wide).is_empty() || heard.is_none() && !quiet::promises(&wide, &frame, &found) {
             break;
@@ -177,6 +181,11 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
     let found = if by_first { by_loop::settled(found, whole, &first, watch) } else { found };
     let found = by_loop::completed(axis, (whole, holdout), &first, found, watch)?;
     watch.at(1.0, "done").map(|()| found)
+}
+
+/// Whether a quieter look is worth it after such an answer.
+fn may_hide_more(found: &Diagnosis) -> bool {
+    matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained | Verdict::UnknownCause)
 }
 
 /// What an answer is about beside the equations.
