@@ -139,9 +139,7 @@ fn told(
     [named, extended]: [&Axis; 2],
     watch: &Watch,
 ) -> Result<Option<Told>, Stopped> {
-    let Some((before, unavoidable)) = replays.error(named).zip(replays.missed_by_sensors(named)) else {
-        return Ok(None);
-    };
+    let Some((before, unavoidable)) = replays.error_and_unavoidable(named) else { return Ok(None) };
     let misses = replays.misses(&before);
     let avoidable: Vec<f64> = misses.iter().zip(&unavoidable).map(|(miss, by)| miss - by.max(NOTHING)).collect();
     if !is_much(&misses) || !is_much(&avoidable.iter().map(|miss| miss + NOTHING).collect::<Vec<_>>()) {

@@ -380,7 +380,8 @@ fn with_one_more(
     // What cannot come among those that are carried on need not be refined.
     let mut prices: Vec<f64> = children.iter().map(|child| child.price).chain(others.iter().map(price)).collect();
     prices.sort_by(f64::total_cmp);
-    let carried_on = prices.get(BEAM - 1).copied().unwrap_or(f64::INFINITY);
+    let so_far = open.iter().map(|(set, _)| price(set)).fold(f64::INFINITY, f64::min);
+    let carried_on = prices.get(BEAM - 1).map_or(so_far, |price| price.min(so_far));
     let most = open.iter().map(|(set, _)| set.parts.len()).max().unwrap_or(0);
     let mut tried: HashMap<Vec<Cause>, usize> = HashMap::new();
     children.retain(|child| {

@@ -91,22 +91,31 @@ impl<'r> Replays<'r> {
     /// nothing. `None` where the replay runs away, and when the watch's caller said stop: replays are most of the work.
     #[must_use]
     pub fn error(&self, axis: &Axis) -> Option<Vec<f64>> {
+        self.error_of(&self.replayed(axis)?)
+    }
+
+    /// The same, and how far each block of that machine is missed as it is replayed, since its servo follows what the encoder is off by: what
+    /// no cause explains.
+    #[must_use]
+    pub fn error_and_unavoidable(&self, axis: &Axis) -> Option<(Vec<f64>, Vec<f64>)> {
+        let sensed = || self.through(self.sensors().pop()?, axis);
+        let (replayed, sensed) = rayon::join(|| self.replayed(axis), sensed);
+        let (replayed, [sensed, _]) = replayed.zip(sensed)?;
+        let rows = sensed.iter().zip(&replayed).skip(self.begun);
+        let by_sensors: Vec<f64> = rows.map(|(sensed, ideal)| sensed - ideal).collect();
+        Some((self.error_of(&replayed)?, self.misses(&by_sensors)))
+    }
+
+    fn replayed(&self, axis: &Axis) -> Option<Vec<f64>> {
         self.watch.at(0.98, STAGE).ok()?;
-        let replayed = self.known.manner.replayed(axis, self.recording, self.part, &[]).ok()??;
-        let rows = self.recording.0.position.iter().zip(&replayed).skip(self.begun);
+        self.known.manner.replayed(axis, self.recording, self.part, &[]).ok()?
+    }
+
+    fn error_of(&self, replayed: &[f64]) -> Option<Vec<f64>> {
+        let rows = self.recording.0.position.iter().zip(replayed).skip(self.begun);
         let finite = |error: f64| if error.is_finite() { error } else { 0.0 };
         let error: Vec<f64> = rows.map(|(measured, replayed)| finite(measured - replayed)).collect();
         error.iter().all(|error| error.abs() < self.stroke).then_some(error)
-    }
-
-    /// How far each block of a machine is missed that is as it is replayed, since its servo follows what the encoder is off by: what no
-    /// cause explains. `None` as for [`Replays::error`].
-    #[must_use]
-    pub fn missed_by_sensors(&self, axis: &Axis) -> Option<Vec<f64>> {
-        let [position, _] = self.through(self.sensors().pop()?, axis)?;
-        let ideal = self.known.manner.replayed(axis, self.recording, self.part, &[]).ok()??;
-        let rows = position.iter().zip(&ideal).skip(self.begun);
-        Some(self.misses(&rows.map(|(sensed, ideal)| sensed - ideal).collect::<Vec<_>>()))
     }
 
     /// Position and torque that recordings of a machine would show through such an encoder, the torque exactly.
