@@ -12,7 +12,7 @@ use rayon::prelude::*;
 const STAGES: [(f64, f64); 3] = [(0.05, 12.0), (0.02, 8.0), (0.006, 4.0)];
 /// Most moves in a stage.
 const MOVES: usize = 6;
-/// Least that the best start takes off ln of the mean square of the sums for anything to be moved.
+/// Least that a clearance takes off ln of the mean square of the sums for it to be moved on.
 const LEAST: f64 = 0.02;
 
 /// The stages of an approach.
@@ -52,9 +52,18 @@ impl<'f, 'a> Approach<'f, 'a> {
         }
         let start = first.parts_under(nearest.law, vec![nearest.shape.clone()], &first.resistance_of(set)).pop()?;
         let mut part = first.approached(&there, start, *stride, MOVES);
+        let shows = |bench: &Bench, set: &Fit, part: &Part| {
+            figure(&bench.channels(&bench.left_beside(set, part))) < set.figure() - LEAST
+        };
+        if !shows(first, &there, &part) {
+            return None;
+        }
         for (bench, stride) in finer {
-            let start = bench.parts_like(&part, vec![part.shape.clone()]).pop()?;
-            part = bench.approached(&bench.again(set), start, *stride, MOVES);
+            let (there, start) = (bench.again(set), bench.parts_like(&part, vec![part.shape.clone()]).pop()?);
+            part = bench.approached(&there, start, *stride, MOVES);
+            if !shows(bench, &there, &part) {
+                return None;
+            }
         }
         Some(part.shape)
     }
