@@ -185,12 +185,14 @@ impl Figures {
             .filter(|e| matches!(e.cause().name(), "cogging" | "external_vibration"))
             .count();
         if ripples > 0 {
-            text.push_str("  phases of periodic terms were estimated from the first quarter of the rows\n");
+            text.push_str(
+                "  phases of periodic terms were estimated from the first quarter of the rows, or of those in motion\n",
+            );
         }
         if predicted.phases_unknown > 0 {
             let _ = writeln!(
                 text,
-                "  {} of them left out: the first quarter shows less than half a period",
+                "  {} of them left out: that quarter shows less than half a period",
                 predicted.phases_unknown
             );
         }

@@ -1,7 +1,7 @@
 //! The torque that a machine file says a measured motion needs.
 //!
 //! Uses the motion of the whole recording (zero-phase) and never its torque, except for the phase of periodic terms,
-//! which is estimated from the first quarter of the rows. Dry friction at rest is not a function of the motion: it is
+//! which is estimated from the first quarter of the rows, or of those in which the axis moves. Dry friction at rest is not a function of the motion: it is
 //! carried over a standstill and turned round over a small travel, the one the machine says (pre-sliding) or the smallest
 //! that the position can tell. Where a clearance or a spring stands between motor and table, the table is simulated behind the
 //! measured motor; where its scale is fine for the clearance, or has it elsewhere in that, its motion is that of the scale.
@@ -32,7 +32,7 @@ pub struct TorquePrediction {
     pub at_start: f64,
     /// The axis's numbers, with the phases that were estimated.
     pub physics: Physics,
-    /// Ripples whose phase could not be had from the first quarter: they are left out of the prediction.
+    /// Ripples whose phase could not be had from the rows for phases: they are left out of the prediction.
     pub phases_unknown: usize,
 }
 
@@ -238,8 +238,22 @@ fn is_elsewhere(
     spread > ELSEWHERE * masses.clearance * per_scale
 }
 
-/// Estimates the phases of cogging and vibration from the first quarter of the rows, where the axis moves; a ripple of
-/// which that quarter shows less than half a period is silenced. Returns how many.
+/// Speed below which an axis stands, for the phases of what it passes.
+fn standing(motion: &Motion) -> f64 {
+    0.01 * rms(motion.velocities().filter(|v| v.is_finite()))
+}
+
+/// Rows that phases are estimated from: the first quarter or, where the axis moves but later, as many as hold a quarter of those in
+/// which it moves. Rows at rest tell no phase.
+fn rows_for_phases(motion: &Motion) -> usize {
+    let standing = standing(motion);
+    let moving = || motion.velocities().enumerate().filter(|(_, v)| v.abs() > standing);
+    let quarter = moving().nth(moving().count() / 4).map_or(0, |(row, _)| row);
+    quarter.max(motion.position.len() / 4)
+}
+
+/// Estimates the phases of cogging and vibration from the rows for phases in which the axis moves; a ripple of which these show
+/// less than half a period is silenced. Returns how many.
 fn set_phases(physics: &mut Physics, observed: &Observed, delivered: &[f64], by_rows: f64) -> usize {
     let cogging = physics.cogging.len();
     let count = cogging + physics.vibration.len();
@@ -247,11 +261,11 @@ fn set_phases(physics: &mut Physics, observed: &Observed, delivered: &[f64], by_
         return 0;
     }
     let (motion, time) = (&observed.motion, &observed.time_s);
-    let standing = 0.01 * rms(motion.velocities().filter(|v| v.is_finite()));
+    let (standing, last) = (standing(motion), rows_for_phases(motion));
     // Beside a row without torque the one between rows is not known either.
     let left = |i: usize| physics.delivered(cubic_at(&observed.torque, i as f64 + by_rows)) - delivered[i];
     let rows = || {
-        (0..time.len() / 4)
+        (0..last)
             .filter(|&i| motion.velocity(i).abs() > standing && motion.acceleration(i).is_finite())
             .map(|i| (i, left(i)))
             .filter(|(_, left)| left.is_finite())
@@ -289,13 +303,13 @@ fn set_phases(physics: &mut Physics, observed: &Observed, delivered: &[f64], by_
     count - shown.len()
 }
 
-/// Estimates the phases of the screw's periodic errors, and where the scale stands at the encoder's zero, from the first
-/// quarter of the rows; without a scale nothing is known of either.
+/// Estimates the phases of the screw's periodic errors, and where the scale stands at the encoder's zero, from the rows for phases;
+/// without a scale nothing is known of either.
 fn set_table_phases(physics: &mut Physics, observed: &Observed) {
     let Some(table) = &observed.table_position else { return };
     let motion = &observed.motion;
     let mut balance = Balance::of(2 + 2 * physics.table_error.len());
-    for (i, table) in table.iter().enumerate().take(table.len() / 4) {
+    for (i, table) in table.iter().enumerate().take(rows_for_phases(motion)) {
         let x = motion.position[i];
         if !(table - x).is_finite() {
             continue;

@@ -1,5 +1,8 @@
 //! What a true machine file leaves of a torque that it was not simulated by.
 
+use crate::board::moves::Segment;
+use crate::board::random::Random;
+use crate::board::truth::Sine;
 use crate::generated::{Rig, fast_ways, predicted, rig, slow_ways};
 use serde_json::json;
 
@@ -32,5 +35,27 @@ fn a_late_or_early_torque_column_is_predicted_as_well() {
         let left = left_while_moving(&figures, &fine());
         println!("seed {seed}, {delay_ms} ms: {left:.2} of the noise");
         assert!((0.9..1.15).contains(&left), "{left}");
+    }
+}
+
+/// A recording that begins with a rest for more than its first quarter.
+fn after_a_rest(random: &mut Random) -> (Vec<Segment>, f64) {
+    let (ways, _) = fast_ways(random);
+    let rest = Segment::Dwell { time: 12.0 };
+    ([rest].into_iter().chain(ways).collect(), 30.0)
+}
+
+/// A resting axis tells nothing of a vibration's phase: it is taken from where the axis moves.
+#[test]
+fn the_phase_of_a_vibration_is_had_from_motion() {
+    for (seed, phase) in [(56, 0.4), (57, 2.9)] {
+        let parameters = json!({"frequency_hz": 17.0, "amplitude_nm": 0.15});
+        let shakes = json!({"cause": "external_vibration", "parameters": parameters});
+        let figures = predicted(after_a_rest, vec![shakes], &fine(), seed, |truth| {
+            truth.vibration = Sine { amplitude: 0.15, period: 1.0 / 17.0, phase };
+        });
+        let left = left_while_moving(&figures, &fine());
+        println!("seed {seed}: {left:.2} of the noise");
+        assert!((0.9..1.2).contains(&left), "{left}");
     }
 }
