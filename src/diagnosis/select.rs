@@ -22,9 +22,11 @@ use once_cell::sync::OnceCell;
 use std::collections::{HashMap, HashSet};
 
 mod noise;
+mod shelf;
 mod starts;
 
-use starts::{Child, at_best_starts, at_seldom_starts, seldom_starts};
+use shelf::{Shelf, shelf};
+use starts::{Child, at_best_starts, at_seldom_starts};
 
 /// Sets that are carried on.
 const BEAM: usize = 2;
@@ -32,10 +34,6 @@ const BEAM: usize = 2;
 const TRIED: usize = 6;
 /// Most causes in a set.
 const MOST: usize = 6;
-/// Most bytes that the seldom starts of a law are kept in; of a longer recording they are made anew for each set.
-const ROOM: usize = 64 << 20;
-/// Starts of a law that are laid out in one go; tables are stepped half as many side by side.
-const AT_A_TIME: usize = 16;
 /// Least gain of a cause in Σ ln(mean square): 8 % of what is left. A smaller one would not be worth a machinist's time,
 /// and imperfect filters, grids and reversals make up to half of it on machines without any fault.
 pub const LEAST_GAIN: f64 = 0.08;
@@ -73,9 +71,6 @@ pub struct Selection {
 pub const BELIEF: [Cause; 4] =
     [Cause::InertiaMismatch, Cause::CoulombFrictionMismatch, Cause::ViscousFrictionMismatch, Cause::ConstantTorque];
 
-/// Terms at the starts of the laws whose starts do not depend on the rest: they are made once.
-type Shelf = HashMap<Cause, Vec<Part>>;
-
 /// What stays the same while sets of causes grow.
 pub struct Search<'s, 'f, 'a> {
     bench: &'s Bench<'f, 'a>,
@@ -101,28 +96,6 @@ impl<'s, 'f, 'a> Search<'s, 'f, 'a> {
         Ok(Self { bench, laws, shelf, tables: OnceCell::new(), seldom: OnceCell::new(), approach, watch })
     }
 
-    /// Lays out what tables would do, unless that is done.
-    fn lay_out_tables(&self) -> Result<(), Stopped> {
-        let empty = self.bench.fit(Vec::new());
-        let tables = self.laws.iter().filter(|law| law.is_simulated());
-        let starts = tables.map(|law| (*law, self.bench.starts(law, &empty)));
-        self.tables.get_or_try_init(|| shelf(self.bench, &self.approach, starts, self.watch)).map(|_| ())
-    }
-
-    /// The same of seldom starts, of those that there is room for.
-    fn lay_out_seldom(&self) -> Result<(), Stopped> {
-        let empty = self.bench.fit(Vec::new());
-        let starts = self.laws.iter().map(|law| (*law, seldom_starts(self.bench, &empty, law)));
-        let row = self.bench.measured.len() * size_of::<f64>();
-        let starts = starts.filter(|(_, shapes)| shapes.len() * row < ROOM);
-        self.seldom.get_or_try_init(|| shelf(self.bench, &self.approach, starts, self.watch)).map(|_| ())
-    }
-
-    /// Terms at the starts of a law.
-    fn shelved(&self, law: &Law) -> &[Part] {
-        self.shelf.get(&law.cause).or_else(|| self.tables.get()?.get(&law.cause)).map_or(&[], Vec::as_slice)
-    }
-
     /// The causes that explain most beside the belief as it is.
     ///
     /// # Errors
@@ -146,30 +119,6 @@ impl<'s, 'f, 'a> Search<'s, 'f, 'a> {
         parts.extend(missing.flat_map(|law| self.bench.parts(law, vec![Vec::new()])));
         self.bench.fit(parts)
     }
-}
-
-fn shelf(
-    bench: &Bench,
-    approach: &Approach,
-    starts: impl Iterator<Item = (&'static Law, Vec<Vec<f64>>)>,
-    watch: &Watch,
-) -> Result<Shelf, Stopped> {
-    // Few starts at a time, so that all cores have work on the laws that take long.
-    let starts: Vec<(&'static Law, Vec<Vec<f64>>)> = starts
-        .filter(|(law, _)| !law.manner.starts_from_rest)
-        .flat_map(|(law, starts)| starts.chunks(AT_A_TIME).map(|c| (law, c.to_vec())).collect::<Vec<_>>())
-        .collect();
-    let laid = watch.each(&starts, (0.05, 0.15), "laying out what each cause would do", |(law, shapes)| {
-        (
-            law.cause,
-            if law.manner.approached { approach.starts(law, shapes.clone()) } else { bench.parts(law, shapes.clone()) },
-        )
-    })?;
-    let mut shelf = Shelf::new();
-    for (cause, parts) in laid {
-        shelf.entry(cause).or_default().extend(parts);
-    }
-    Ok(shelf)
 }
 
 fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
