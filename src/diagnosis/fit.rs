@@ -297,6 +297,16 @@ impl<'f, 'a> Bench<'f, 'a> {
 }
 
 impl Part {
+    /// The same on other equations of the same rows, by what these make of a column.
+    fn on_others(&self, of: impl Fn(&[f64]) -> Vec<f64>) -> Self {
+        Self {
+            fixed: self.fixed.as_deref().map(|fixed| of(fixed).into()),
+            columns: self.columns.iter().map(|column| of(column)).collect(),
+            sides: Arc::default(),
+            ..self.clone()
+        }
+    }
+
     /// Number of its non-linear parameters that are fitted.
     #[must_use]
     pub fn free_parameters(&self) -> usize {

@@ -242,7 +242,7 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
     // carried on and halves what is left, or leaves little: beside one that is they are asked next, which shows what only
     // imitates them. Beside none they are asked unless such a law by itself cannot be an imitation.
     let first = beam.iter().all(|set| set.parts.is_empty());
-    let asked_last = !first && beam.iter().all(|set| !set.parts.is_empty() && set.table().is_none());
+    let asked_last = beam.iter().all(|set| !set.parts.is_empty() && set.table().is_none());
     let needless = tables.is_empty() || first && tells_by_itself(bench, &children);
     let both: Vec<_> = by_rows.iter().chain(&tables).copied().collect();
     let mut grown = if asked_last || needless {
@@ -299,7 +299,7 @@ fn tells_by_itself(bench: &Bench, children: &[Child]) -> bool {
     !of_tables && explains(&best.refined(bench, f64::INFINITY))
 }
 
-/// Each of these laws at its best start beside its set, most promising first.
+/// Each of these laws at its best starts beside its set.
 fn look<'s>(
     search: &Search,
     open: &[(&'s Fit, &'static Law)],

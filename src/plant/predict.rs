@@ -1,10 +1,11 @@
 //! The torque that a machine file says a measured motion needs.
 //!
 //! Uses the motion of the whole recording (zero-phase) and never its torque, except for the phase of periodic terms,
-//! which is estimated from the first quarter of the rows, or of those in which the axis moves. Dry friction at rest is not a function of the motion: it is
-//! carried over a standstill and turned round over a small travel, the one the machine says (pre-sliding) or the smallest
-//! that the position can tell. Where a clearance or a spring stands between motor and table, the table is simulated behind the
-//! measured motor; where its scale is fine for the clearance, or has it elsewhere in that, its motion is that of the scale.
+//! which is estimated from the first quarter of the rows, or of those in which the axis moves. Dry friction at rest is not a
+//! function of the motion: it is carried over a standstill and turned round over a small travel, the one the machine says
+//! (pre-sliding) or the smallest that the position can tell. Where a clearance or a spring stands between motor and table, the
+//! table is simulated behind the measured motor; where its scale is fine for the clearance, or has it elsewhere in that, its
+//! motion is that of the scale.
 //!
 //! Sampling: a row holds the torque at the end of a cycle, before the servo answers to that row. The servo held its command
 //! for that cycle and the motor followed with time constant τ, so the row is later than the smooth torque of the motion:

@@ -2,7 +2,6 @@
 //! trace, and what is left is fitted as if they were not there (Frisch and Waugh 1933, Lovell 1963).
 
 use super::{Bench, Fit, Part, add, dot, orthonormal, project};
-use std::sync::Arc;
 
 /// Equations beside free columns of the torque.
 pub struct Beside<'f, 'a> {
@@ -96,13 +95,7 @@ impl Beside<'_, '_> {
             clear(&mut column, &self.directions);
             column
         };
-        let part = |part: &Part| Part {
-            fixed: part.fixed.as_deref().map(|fixed| cleared(fixed).into()),
-            columns: part.columns.iter().map(|column| cleared(column)).collect(),
-            sides: Arc::default(),
-            ..part.clone()
-        };
-        parts.iter().map(part).collect()
+        parts.iter().map(|part| part.on_others(cleared)).collect()
     }
 
     /// The fit of parts of other equations of the same rows.

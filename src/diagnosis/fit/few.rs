@@ -1,9 +1,9 @@
 //! The same equations of few of their rows: enough to see how much a law explains, in a fraction of the time.
 
 use super::beside::orthonormalised;
+use super::smoothed::unit;
 use super::{Bench, Fit, Part, dot};
 use crate::diagnosis::frame::Frame;
-use std::sync::Arc;
 
 impl Bench<'_, '_> {
     /// These equations of one judged row in so many, on the frame of those ([`Frame::few`]).
@@ -11,11 +11,6 @@ impl Bench<'_, '_> {
     pub fn of_few<'g, 'b>(&self, frame: &'g Frame<'b>, every: usize) -> Bench<'g, 'b> {
         let few = |column: &[f64]| few(column, self.rows, every);
         let (measured, doubt, certain) = (few(&self.measured), few(&self.doubt), few(&self.certain));
-        let unit = |mut column: Vec<f64>| {
-            let length = dot(&column, &column).sqrt().max(1e-300);
-            column.iter_mut().for_each(|value| *value /= length);
-            column
-        };
         let free = orthonormalised(self.free.iter().map(|column| unit(few(column))).collect());
         let (floors, resistance) = (self.floors, self.resistance.clone());
         let rows = frame.kept.len();
@@ -27,12 +22,7 @@ impl Part {
     /// The same of equations of one row in so many.
     #[must_use]
     pub fn of_few(&self, rows: usize, every: usize) -> Self {
-        Part {
-            fixed: self.fixed.as_deref().map(|fixed| few(fixed, rows, every).into()),
-            columns: self.columns.iter().map(|column| few(column, rows, every)).collect(),
-            sides: Arc::default(),
-            ..self.clone()
-        }
+        self.on_others(|column| few(column, rows, every))
     }
 }
 

@@ -7,7 +7,6 @@
 use super::beside::orthonormalised;
 use super::{Bench, Fit, Part, dot, project};
 use std::ops::Range;
-use std::sync::Arc;
 
 /// Shares of a step that are tried.
 const SHARES: [f64; 8] = [1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 0.05, 0.02];
@@ -52,13 +51,7 @@ impl Bench<'_, '_> {
     #[must_use]
     pub fn again(&self, set: &Fit) -> Fit {
         let sum = |column: &[f64]| summed(column.to_vec(), self.frame.kept.len(), &self.windows);
-        let part = |part: &Part| Part {
-            fixed: part.fixed.as_deref().map(|fixed| sum(fixed).into()),
-            columns: part.columns.iter().map(|column| sum(column)).collect(),
-            sides: Arc::default(),
-            ..part.clone()
-        };
-        self.fit(set.parts.iter().map(part).collect())
+        self.fit(set.parts.iter().map(|part| part.on_others(sum)).collect())
     }
 
     /// What is left when a part without coefficients joins a set.
@@ -133,7 +126,8 @@ pub(super) fn summed(column: Vec<f64>, rows: usize, windows: &[Range<usize>]) ->
     out
 }
 
-fn unit(mut column: Vec<f64>) -> Vec<f64> {
+/// A column of unit length.
+pub(super) fn unit(mut column: Vec<f64>) -> Vec<f64> {
     let length = dot(&column, &column).sqrt().max(1e-300);
     column.iter_mut().for_each(|c| *c /= length);
     column

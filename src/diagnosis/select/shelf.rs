@@ -14,19 +14,25 @@ pub type Shelf = HashMap<Cause, Vec<Part>>;
 impl Search<'_, '_, '_> {
     /// Lays out what tables would do, unless that is done.
     pub(super) fn lay_out_tables(&self) -> Result<(), Stopped> {
-        let empty = self.bench.fit(Vec::new());
-        let tables = self.laws.iter().filter(|law| law.is_simulated());
-        let starts = tables.map(|law| (*law, self.bench.starts(law, &empty)));
-        self.tables.get_or_try_init(|| shelf(self.bench, &self.approach, starts, self.watch)).map(|_| ())
+        let lay_out = || {
+            let empty = self.bench.fit(Vec::new());
+            let tables = self.laws.iter().filter(|law| law.is_simulated());
+            let starts = tables.map(|law| (*law, self.bench.starts(law, &empty)));
+            shelf(self.bench, &self.approach, starts, self.watch)
+        };
+        self.tables.get_or_try_init(lay_out).map(|_| ())
     }
 
     /// The same of seldom starts, of those that there is room for.
     pub(super) fn lay_out_seldom(&self) -> Result<(), Stopped> {
-        let empty = self.bench.fit(Vec::new());
-        let starts = self.laws.iter().map(|law| (*law, seldom_starts(self.bench, &empty, law)));
-        let row = self.bench.measured.len() * size_of::<f64>();
-        let starts = starts.filter(|(_, shapes)| shapes.len() * row < ROOM);
-        self.seldom.get_or_try_init(|| shelf(self.bench, &self.approach, starts, self.watch)).map(|_| ())
+        let lay_out = || {
+            let empty = self.bench.fit(Vec::new());
+            let row = self.bench.measured.len() * size_of::<f64>();
+            let starts = self.laws.iter().map(|law| (*law, seldom_starts(self.bench, &empty, law)));
+            let starts = starts.filter(|(_, shapes)| shapes.len() * row < ROOM);
+            shelf(self.bench, &self.approach, starts, self.watch)
+        };
+        self.seldom.get_or_try_init(lay_out).map(|_| ())
     }
 
     /// Terms at the starts of a law.
