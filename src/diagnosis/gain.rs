@@ -45,14 +45,15 @@ pub struct Replay {
     pub error: Vec<f64>,
 }
 
-/// How many times longer than usual the plant steps are: the position goes with it by some nanometres at most.
+/// How many times longer than usual the plant steps are: the position goes with it by two nanometres at most.
 const COARSER: f64 = 4.0;
+/// What short steps are for: a torque that changes with speed, way or time is taken as it was before a step.
+const WANT_SHORT_STEPS: [Cause; 3] = [Cause::PreslidingFriction, Cause::StribeckFriction, Cause::ExternalVibration];
 
 /// The errors of a machine on a recording; `None` where nothing can be predicted.
 pub(super) fn errors(axis: &Axis, observed: &Observed, servo: &ByServo) -> Option<Errors> {
-    // Friction that builds up swings on a stiffness of its own.
-    let builds_up = axis.effects.iter().any(|effect| effect.cause() == Cause::PreslidingFriction);
-    let prediction = predict_by(axis, observed, servo, if builds_up { 1.0 } else { COARSER }).ok()?;
+    let short = axis.effects.iter().any(|effect| WANT_SHORT_STEPS.contains(&effect.cause()));
+    let prediction = predict_by(axis, observed, servo, if short { 1.0 } else { COARSER }).ok()?;
     let less =
         |measured: &[f64], model: &[f64]| -> Vec<f64> { measured.iter().zip(model).map(|(m, p)| m - p).collect() };
     let replayed = prediction.closed_loop.as_ref();
