@@ -17,6 +17,7 @@ fn impacts_may_be_a_little_other_than_believed_and_a_clearance_may_not() {
         table_inertia_share: 0.45,
         table_friction_share: 0.7,
         contact_hz,
+        contact_damping_ratio: 0.3,
     };
     let believed = rig(&[clearance(30.0, 900.0)]);
     for seed in [3, 4] {
@@ -58,6 +59,7 @@ fn what_has_changed_takes_the_place_of_what_is_believed_of_it() {
         table_inertia_share: 0.49,
         table_friction_share: 0.47,
         contact_hz: 350.0,
+        contact_damping_ratio: 0.3,
     };
     let changed = [
         (drift(0.08), drift(0.16)),

@@ -116,8 +116,13 @@ fn an_axis_within_its_friction_stands_still_to_the_last_bit() {
 /// that they meet a part of a step sooner or later.
 #[test]
 fn calm_flanks_do_as_well_in_longer_steps() {
-    let backlash =
-        Effect::Backlash { width_um: 50.0, table_inertia_share: 0.4, table_friction_share: 0.6, contact_hz: 1500.0 };
+    let backlash = Effect::Backlash {
+        width_um: 50.0,
+        table_inertia_share: 0.4,
+        table_friction_share: 0.6,
+        contact_hz: 1500.0,
+        contact_damping_ratio: 0.3,
+    };
     for moves in ["reversals", "test"] {
         let [long, short] =
             [25e-6, 5e-6].map(|step_s| run(&rig(&[backlash]), moves, &Setup { step_s, ..Setup::default() }));
@@ -130,8 +135,13 @@ fn calm_flanks_do_as_well_in_longer_steps() {
 
 #[test]
 fn a_clearance_is_crossed_without_torque_on_the_table() {
-    let backlash =
-        Effect::Backlash { width_um: 50.0, table_inertia_share: 0.5, table_friction_share: 0.5, contact_hz: 400.0 };
+    let backlash = Effect::Backlash {
+        width_um: 50.0,
+        table_inertia_share: 0.5,
+        table_friction_share: 0.5,
+        contact_hz: 400.0,
+        contact_damping_ratio: 0.3,
+    };
     let trace = run(&rig(&[backlash]), "reversals", &Setup::default());
     // In steady slow motion one way and the other, motor − table differs by clearance + 2·Ts/k.
     let masses = rig(&[backlash]).two_masses().unwrap().unwrap();
@@ -151,7 +161,13 @@ fn a_clearance_is_crossed_without_torque_on_the_table() {
 #[test]
 fn the_plant_converges_with_its_step() {
     let effects = [
-        Effect::Backlash { width_um: 20.0, table_inertia_share: 0.4, table_friction_share: 0.6, contact_hz: 400.0 },
+        Effect::Backlash {
+            width_um: 20.0,
+            table_inertia_share: 0.4,
+            table_friction_share: 0.6,
+            contact_hz: 400.0,
+            contact_damping_ratio: 0.3,
+        },
         Effect::PreslidingFriction { displacement_um: 8.0, exponent: 1.0, maxwell_slip: 0.0, micro_damping_s: 0.0 },
         Effect::StribeckFriction { torque: 0.3, velocity_mm_s: 4.0, exponent: 2.0 },
     ];
@@ -257,6 +273,7 @@ fn a_clearance_is_predicted_with_and_without_a_scale() {
         table_inertia_share: 0.4,
         table_friction_share: 0.6,
         contact_hz: 400.0,
+        contact_damping_ratio: 0.3,
     }]);
     let rigid = residual(&rig(&[]), &truth, 11);
     let (encoder, scale) = (residual(&truth, &truth, 11), residual_of(&truth, &truth, 11, true));

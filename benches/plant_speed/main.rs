@@ -31,7 +31,13 @@ fn main() -> ExitCode {
             table_friction_share: 0.5,
             damping_ratio: 0.05,
         },
-        Effect::Backlash { width_um: 20.0, table_inertia_share: 0.5, table_friction_share: 0.5, contact_hz: 700.0 },
+        Effect::Backlash {
+            width_um: 20.0,
+            table_inertia_share: 0.5,
+            table_friction_share: 0.5,
+            contact_hz: 700.0,
+            contact_damping_ratio: 0.3,
+        },
         Effect::PreslidingFriction { displacement_um: 8.0, exponent: 1.0, maxwell_slip: 0.0, micro_damping_s: 0.0 },
         Effect::StribeckFriction { torque: 0.3, velocity_mm_s: 4.0, exponent: 2.0 },
     ]);

@@ -24,7 +24,7 @@ struct Options {
     /// Seed; the clock where left out. It is printed, and repeats the run.
     #[arg(long)]
     seed: Option<u64>,
-    /// Hide only this: a cause, an outside effect, `none`, `two`, `beliefs` or `before_table` (a spring or a clearance beside a friction
+    /// Hide only this: a cause, an outside effect, `none`, `two`, `beliefs`, `loose_spring` (an elastic drive with play) or `before_table` (a spring or a clearance beside a friction
     /// or a load).
     #[arg(long)]
     cause: Option<String>,
@@ -62,7 +62,7 @@ fn main() -> ExitCode {
         Some(Ok(kind)) => Some(kind),
         Some(Err(name)) => {
             eprintln!(
-                "--cause {name}: not a cause. Known: none two beliefs before_table {} {}",
+                "--cause {name}: not a cause. Known: none two beliefs before_table loose_spring {} {}",
                 effects::CAUSES.join(" "),
                 outside::NAMES.join(" ")
             );

@@ -256,7 +256,7 @@ def speed_varies(recording):
 
 
 def diagnosed():
-    """The plant's y axis has a cable chain that the belief, machine.json, knows nothing of."""
+    """The plant's y axis has a cable chain and a drive with play that the belief, machine.json, knows nothing of."""
     def moves():
         for feed, to in ((3000, 150), (1500, 20), (1000, 60), (2400, 10), (2000, 100), (3000, 5)):
             mdi(f"G1 Y{to} F{feed}")
@@ -270,9 +270,12 @@ def diagnosed():
                    stdout=subprocess.DEVNULL, check=False)
     with open("y.json", encoding="utf-8") as file:
         findings = {f["cause"]: f for f in json.load(file)["findings"]}
-    slope = findings.get("cable_force", {}).get("parameters", {}).get("slope_nm_mm", {}).get("value", 0)
-    truth = pin("gib-sim-axis.1.cable")
-    check(abs(slope / truth - 1) < 0.05, f"gib diagnose names {sorted(findings)}; cable {slope:.4f} N m/mm, truth {truth}")
+    # N m/mm at the motor are N/mm at the table by 2 pi over the lead of 10 mm in m.
+    truth = {("cable_force", "slope_nm_mm"): pin("gib-sim-axis.1.cable"), ("backlash", "backlash_um"): 1e3 * pin("gib-sim-axis.1.clearance"),
+             ("drive_compliance", "stiffness_n_um"): 1e-3 * pin("gib-sim-axis.1.stiffness") * 2 * math.pi / 0.010}
+    found = {key: findings.get(key[0], {}).get("parameters", {}).get(key[1], {}).get("value", 0) for key in truth}
+    check(all(abs(found[key] / truth[key] - 1) < 0.05 for key in truth) and len(findings) == len(truth),
+          f"gib diagnose names {sorted(findings)}: " + ", ".join(f"{key[1]} {found[key]:.4g}, truth {truth[key]:.4g}" for key in truth))
 
 
 def refused():

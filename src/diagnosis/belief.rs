@@ -117,11 +117,12 @@ fn on_inertia(axis: &Axis, effect: Effect, inertia: f64) -> Effect {
             table_friction_share,
             damping_ratio: 0.5 * m.damping * omega / m.stiffness,
         },
-        Effect::Backlash { width_um, table_friction_share, .. } => Effect::Backlash {
+        Effect::Backlash { width_um, table_friction_share, contact_damping_ratio, .. } => Effect::Backlash {
             width_um,
             table_inertia_share: m.table_inertia / inertia,
             table_friction_share,
             contact_hz: omega / TAU,
+            contact_damping_ratio,
         },
         other => other,
     }

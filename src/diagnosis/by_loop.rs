@@ -309,8 +309,13 @@ mod tests {
 
     #[test]
     fn a_clearance_that_the_torque_does_not_show_is_told() {
-        let hidden =
-            Effect::Backlash { width_um: 5.0, table_inertia_share: 0.4, table_friction_share: 0.6, contact_hz: 600.0 };
+        let hidden = Effect::Backlash {
+            width_um: 5.0,
+            table_inertia_share: 0.4,
+            table_friction_share: 0.6,
+            contact_hz: 600.0,
+            contact_damping_ratio: 0.3,
+        };
         let told = told(&[hidden]);
         let [Effect::Backlash { width_um, .. }] = told.as_slice() else { panic!("{told:?}") };
         assert!((width_um / 5.0 - 1.0).abs() < 0.1, "{width_um}");

@@ -3,7 +3,8 @@
 //! soft, and how far those lie apart that leave about as much is a part of the uncertainty. What hardness the machine is given is
 //! what predicts its torque best: an impact that is hard and comes a row too late errs twice.
 
-use super::fit::{Bench, Fit};
+use super::causes::loose_spring;
+use super::fit::{Bench, Fit, Part};
 use super::gain::HeldOut;
 use super::judge::{Excess, LITTLE_LEFT};
 use super::progress::{Stopped, Watch};
@@ -22,7 +23,8 @@ const ALIKE: f64 = 1.1;
 /// # Errors
 /// [`Stopped`] when the watch's caller said so.
 pub fn settled(bench: &Bench, held_out: &HeldOut, found: Selection, watch: &Watch) -> Result<Selection, Stopped> {
-    let Some(at) = found.fit.parts.iter().position(|part| part.law.cause == Cause::Backlash) else { return Ok(found) };
+    let hard = |part: &Part| part.law.cause == Cause::Backlash && !loose_spring::is(part);
+    let Some(at) = found.fit.parts.iter().position(hard) else { return Ok(found) };
     let with_contact = |fit: &Fit, hz: f64| {
         let mut parts = fit.parts.clone();
         let mut shape = parts[at].shape.clone();

@@ -172,7 +172,7 @@ fn phase(frame: &Frame, sum: &Trace, sine: &Trace, cosine: &Trace) -> (f64, f64)
 #[must_use]
 pub fn numbers(axis: &Axis, frame: &Frame, effect: &Effect) -> Option<(&'static Law, Vec<f64>)> {
     let shape = match *effect {
-        Effect::Backlash { width_um, table_inertia_share, table_friction_share, contact_hz } => {
+        Effect::Backlash { width_um, table_inertia_share, table_friction_share, contact_hz, .. } => {
             vec![width_um, table_inertia_share, table_friction_share, contact_hz]
         }
         Effect::DriveCompliance { .. } => table_side::swing_of(&axis.two_masses().ok()??),

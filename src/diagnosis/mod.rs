@@ -38,6 +38,7 @@ mod low_limit;
 mod many;
 mod means;
 mod narrow;
+mod play;
 pub mod progress;
 mod quiet;
 mod reopened;

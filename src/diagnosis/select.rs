@@ -6,14 +6,15 @@
 
 use super::approach::Approach;
 use super::astray;
-use super::causes::Law;
 use super::causes::periods::{FEW, is_all_the_time, is_in_each_period};
+use super::causes::{Law, loose_spring};
 use super::fit::{Bench, Fit, Part, figure};
 use super::form;
 use super::formulation;
 use super::judge::{Excess, LITTLE_LEFT};
 use super::many::add;
 use super::means;
+use super::play;
 use super::progress::{Stopped, Watch};
 use super::shrink::{idle_left_out, shrink};
 use super::valleys;
@@ -158,7 +159,13 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     let open = idle_left_out(search.bench, search.with_beliefs(&start), search.watch)?;
     let start = if price(&open) < price(&start) { open } else { start };
     let fit = shrink(search.bench, start, search.watch)?;
-    let fit = means::settled(search.bench, valleys::settled(search.bench, search.laws, fit, search.watch)?);
+    let fit = valleys::settled(search.bench, search.laws, fit, search.watch)?;
+    let mut fit = play::added(search.bench, fit, search.watch)?;
+    // What stood in for the play of a spring, or for the spring of a clearance, is not needed beside both.
+    if fit.parts.iter().any(loose_spring::is) {
+        fit = shrink(search.bench, fit, search.watch)?;
+    }
+    let fit = means::settled(search.bench, fit);
     rivals.retain(|r| r.parts.len() == fit.parts.len() && !same_causes(r, &fit));
     let plain = Selection { fit, rivals, alike: Vec::new() };
     let found = formulation::settled(search.bench, plain, search.watch)?;
@@ -172,6 +179,7 @@ fn at_the_bottom(search: &Search, fit: &Fit) -> Result<Fit, Stopped> {
     }
     let refined = search.bench.refine(fit.clone(), 0, 8);
     let refined = valleys::settled(search.bench, search.laws, refined, search.watch)?;
+    let refined = play::added(search.bench, refined, search.watch)?;
     Ok(if is_physical(search.bench, &refined) { refined } else { fit.clone() })
 }
 

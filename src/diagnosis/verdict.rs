@@ -4,7 +4,7 @@
 
 use super::belief;
 use super::by_loop;
-use super::causes::{LAWS, Law, law};
+use super::causes::{LAWS, Law, law, loose_spring};
 use super::creep;
 use super::excerpt::Excerpt;
 use super::experiment;
@@ -401,20 +401,31 @@ fn findings(axis: &Axis, bench: &Bench, selection: &Selection, sure: Option<&Sur
     let fit = &selection.fit;
     let mut effects = uncertainty::effects(bench, fit, sure);
     uncertainty::widen(bench, &mut effects, &selection.alike);
-    belief::reconcile(bench.frame.axis, effects.iter_mut().flatten().map(|(effect, _)| effect));
+    let found =
+        effects.into_iter().enumerate().filter_map(|(i, found)| found.map(|(effect, std)| (i, 1.0, effect, std)));
+    let mut found: Vec<(usize, f64, Effect, Vec<f64>)> = found.collect();
+    // A clearance with a spring is one part, and two causes.
+    if let Some(at) = found.iter().position(|(i, ..)| loose_spring::is(&fit.parts[*i])) {
+        let (i, ..) = found.swap_remove(at);
+        let play = loose_spring::share_of_play(bench.frame, &fit.parts[i].shape);
+        for (law, share) in loose_spring::SAID.iter().zip([play, 1.0 - play]) {
+            let said = uncertainty::effects(bench, &loose_spring::said_as(fit, i, law), sure).swap_remove(i);
+            found.extend(said.map(|(effect, std)| (i, share, effect, std)));
+        }
+    }
+    belief::reconcile(bench.frame.axis, found.iter_mut().map(|(.., effect, _)| effect));
     let total = 1.0 - (fit.squares() / empty.squares()).min(1.0);
     let drops: Vec<f64> =
         (0..fit.parts.len()).map(|i| (bench.without(fit, i).squares() - fit.squares()).max(0.0)).collect();
     let sum = drops.iter().sum::<f64>().max(1e-300);
     let mut list: Vec<Finding> = Vec::new();
-    for (i, found) in effects.into_iter().enumerate() {
-        let Some((effect, deviations)) = found else { continue };
+    for (i, share, effect, deviations) in found {
         let law: &Law = law(effect.cause());
         let ties = ties(bench, selection, i);
         list.push(Finding {
             evidence: (law.sentence)(&belief::together(axis, effect), bench.frame.axis),
             confidence: confidence(block_t(bench, &bench.without(fit, i), fit)),
-            share: (drops[i] / sum * total).clamp(0.0, 1.0),
+            share: (share * drops[i] / sum * total).clamp(0.0, 1.0),
             next_experiment: ties.first().map(|other| experiment::telling(bench.frame, effect.cause(), *other)),
             indistinguishable_from: ties,
             effect: belief::together(axis, effect),
@@ -467,7 +478,7 @@ pub fn block_t(bench: &Bench, less: &Fit, full: &Fit) -> f64 {
 fn ties(bench: &Bench, selection: &Selection, part: usize) -> Vec<Cause> {
     let fit = &selection.fit;
     let own = fit.parts[part].law.cause;
-    let others: Vec<Cause> = fit.parts.iter().map(|p| p.law.cause).collect();
+    let others: Vec<Cause> = fit.parts.iter().flat_map(loose_spring::causes).collect();
     let mut list = Vec::new();
     for rival in &selection.rivals {
         let strange: Vec<Cause> = rival.parts.iter().map(|p| p.law.cause).filter(|c| !others.contains(c)).collect();

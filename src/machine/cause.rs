@@ -159,6 +159,8 @@ vocabulary! {
         table_friction_share: "table_friction_share", "table_friction_share", "", 0.0, 1.0, = 0.5;
         /// How stiff the flanks meet: the frequency of motor against table while they touch, Hz; drive_compliance overrules it.
         contact_hz: "contact_hz", "contact_hz", "", 1.0, 1e5, = 700.0;
+        /// Damping ratio of that; drive_compliance overrules it.
+        contact_damping_ratio: "contact_damping_ratio", "contact_damping_ratio", "", 0.0, 10.0, = 0.3;
     }
     /// Elastic drive. The frequency is that of the two free masses, √(k·(1/J₁+1/J₂))/2π: with the stiffness it gives both masses,
     /// but not which of them is the table.

@@ -7,9 +7,6 @@
 use super::{Axis, Effect};
 use std::f64::consts::TAU;
 
-/// Damping ratio of the flanks' contact.
-const CONTACT_DAMPING: f64 = 0.3;
-
 /// An axis as motor and table, everything in the motor's coordinate and the drive's own unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TwoMasses {
@@ -38,15 +35,15 @@ impl Axis {
         let mut compliance = None;
         for effect in &self.effects {
             match *effect {
-                Effect::Backlash { width_um, table_inertia_share, table_friction_share, contact_hz } => {
-                    let clearance = width_um * self.drive.motor_per_um();
-                    backlash = Some((clearance, table_inertia_share, table_friction_share, TAU * contact_hz));
-                }
+                Effect::Backlash { .. } => backlash = Some(effect),
                 Effect::DriveCompliance { .. } => compliance = Some(effect),
                 _ => {}
             }
         }
-        let clearance = backlash.map_or(0.0, |(clearance, _, _, _)| clearance);
+        let clearance = match backlash {
+            Some(Effect::Backlash { width_um, .. }) => width_um * self.drive.motor_per_um(),
+            _ => 0.0,
+        };
         if let Some(&Effect::DriveCompliance {
             resonance_hz,
             stiffness_n_um,
@@ -80,13 +77,22 @@ impl Axis {
                 table_friction_share,
             }));
         }
-        Ok(backlash.map(|(_, inertia_share, table_friction_share, omega)| {
-            let table_inertia = inertia_share * inertia;
-            let motor_inertia = inertia - table_inertia;
-            let stiffness = omega * omega * motor_inertia * table_inertia / inertia;
-            let damping = 2.0 * CONTACT_DAMPING * stiffness / omega;
-            TwoMasses { motor_inertia, table_inertia, stiffness, damping, clearance, table_friction_share }
-        }))
+        let Some(&Effect::Backlash {
+            table_inertia_share,
+            table_friction_share,
+            contact_hz,
+            contact_damping_ratio,
+            ..
+        }) = backlash
+        else {
+            return Ok(None);
+        };
+        let table_inertia = table_inertia_share * inertia;
+        let motor_inertia = inertia - table_inertia;
+        let omega = TAU * contact_hz;
+        let stiffness = omega * omega * motor_inertia * table_inertia / inertia;
+        let damping = 2.0 * contact_damping_ratio * stiffness / omega;
+        Ok(Some(TwoMasses { motor_inertia, table_inertia, stiffness, damping, clearance, table_friction_share }))
     }
 }
 

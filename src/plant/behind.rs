@@ -147,8 +147,13 @@ mod tests {
 
     #[test]
     fn a_table_that_goes_with_its_motor_does_as_well_in_longer_steps() {
-        let flanks =
-            Effect::Backlash { width_um: 25.0, table_inertia_share: 0.4, table_friction_share: 0.6, contact_hz: 900.0 };
+        let flanks = Effect::Backlash {
+            width_um: 25.0,
+            table_inertia_share: 0.4,
+            table_friction_share: 0.6,
+            contact_hz: 900.0,
+            contact_damping_ratio: 0.3,
+        };
         let belief = Machine::parse(include_str!("../../examples/machines/believed.json")).unwrap().axes.remove(0);
         let axis = belief.with_effects(vec![flanks]);
         let reach = Reach { start: 20.0, stroke: 200.0, speed: 250.0, acceleration: 2500.0 };

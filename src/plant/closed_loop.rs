@@ -3,13 +3,13 @@
 //! Starts in the state that the recording shows in its first row; after that nothing measured enters but the command, the torque
 //! that was added to the servo's, where there was such, and which of three differences the control takes for the command's speed.
 
-use super::added::{Added, ByServo, Pulses};
+use super::added::{Added, ByServo, Pulses, median};
 use super::at_rows::{AtRows, Between, ROUNDED, Reader, command_of_cycles};
 use super::lateness::Lateness;
 use super::noise::Noise;
 use super::observed::Observed;
 use super::physics::{Physics, Ripple};
-use super::predict::{TorquePrediction, predict_torque};
+use super::predict::{TorquePrediction, predict_torque, rows_for_phases, standing};
 use super::servo::{CommandSpeed, by_clock};
 use super::simulate::{Sensors, Setup, Start, simulate_cycles, steps_per_cycle};
 use super::sudden;
@@ -370,8 +370,25 @@ fn replay(
     let mut physics = prediction.physics.clone();
     physics.delay_s = 0.0;
     simulate_cycles(axis, physics, command, added, &setup, &mut Noise::new(0), &mut rows)?;
-    let table_position = rows.table.map(|table| table.values);
+    let table_position = rows.table.map(|table| at_the_scales_zero(table.values, observed));
     Ok(Some((ClosedLoop { position: rows.motor.values, table_position }, rows.torque.values)))
+}
+
+/// A simulated table by the zero of its scale, which nobody knows: half way between those of either way in the rows for phases, where
+/// what a load winds up is none of it and an impact that comes a row early or late weighs little.
+fn at_the_scales_zero(mut simulated: Vec<f64>, observed: &Observed) -> Vec<f64> {
+    let (motion, standing) = (&observed.motion, standing(&observed.motion));
+    let zero = |way: f64| {
+        let pairs = observed.table_position.iter().flatten().zip(&simulated).zip(motion.velocities());
+        let rows = pairs.take(rows_for_phases(motion)).filter(|(_, v)| way * v > standing);
+        median(rows.map(|((measured, simulated), _)| measured - simulated))
+    };
+    let zeros = [zero(1.0), zero(-1.0)].into_iter().flatten();
+    let (count, sum) = zeros.fold((0.0, 0.0), |(count, sum), zero| (count + 1.0, sum + zero));
+    if count > 0.0 {
+        simulated.iter_mut().for_each(|table| *table += sum / count);
+    }
+    simulated
 }
 
 /// Rows at rest, whose torque is that of the replay; a torque column that is late shows it as much later.

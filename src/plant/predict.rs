@@ -240,13 +240,13 @@ fn is_elsewhere(
 }
 
 /// Speed below which an axis stands, for the phases of what it passes.
-fn standing(motion: &Motion) -> f64 {
+pub(super) fn standing(motion: &Motion) -> f64 {
     0.01 * rms(motion.velocities().filter(|v| v.is_finite()))
 }
 
 /// Rows that phases are estimated from: the first quarter or, where the axis moves but later, as many as hold a quarter of those in
 /// which it moves. Rows at rest tell no phase.
-fn rows_for_phases(motion: &Motion) -> usize {
+pub(super) fn rows_for_phases(motion: &Motion) -> usize {
     let standing = standing(motion);
     let moving = || motion.velocities().enumerate().filter(|(_, v)| v.abs() > standing);
     let quarter = moving().nth(moving().count() / 4).map_or(0, |(row, _)| row);

@@ -162,6 +162,16 @@ fn springs_and_clearances_are_told_beside_what_resists_the_table() {
     assert!((0.9..1.1).contains(&residual), "{residual}");
 }
 
+/// A spring that has play is both, each with its own numbers: either by itself leaves many times as much.
+#[test]
+fn a_spring_with_play_is_two_causes() {
+    let summary = summarise(&diagnosed(1, &[Kind::LooseSpring; 8], 12.0, false));
+    assert_eq!((summary.failures, summary.wrong_beside.0), (0, 0));
+    assert!(summary.both_of_two.0 >= 5, "{:?}", summary.both_of_two);
+    let error = summary.parameter_error.unwrap();
+    assert!((1e-5..0.02).contains(&error), "median parameter error {error}");
+}
+
 /// Each of these cases, a seed and a number, of one cause is named by itself, and as right on the hold-out as by the true model.
 fn named_alone(cause: &'static str, cases: &[(u64, usize)]) {
     let cases: Vec<(u64, usize, Kind)> = cases.iter().map(|&(seed, index)| (seed, index, Kind::One(cause))).collect();

@@ -36,6 +36,8 @@ pub enum Kind {
     Beliefs,
     /// A spring or a clearance, beside a friction or a load under which it winds up or is crossed: small or large.
     BeforeTable,
+    /// A spring with play: an elastic drive and a clearance.
+    LooseSpring,
     Outside(&'static str),
 }
 
@@ -66,6 +68,7 @@ impl Kind {
             "two" => Some(Self::Two),
             "beliefs" => Some(Self::Beliefs),
             "before_table" => Some(Self::BeforeTable),
+            "loose_spring" => Some(Self::LooseSpring),
             _ => (effects::CAUSES.iter().find(|c| **c == name).map(|c| Self::One(c)))
                 .or_else(|| outside::NAMES.iter().find(|c| **c == name).map(|c| Self::Outside(c))),
         }
@@ -214,7 +217,11 @@ fn together(kind: Kind, rig: &Rig, random: &mut Random) -> Option<Vec<&'static s
     let possible = |c: &&&str| effects::possible(c, rig) && (rig.table.is_some() || !effects::on_table_only(c));
     let causes: Vec<&str> = effects::CAUSES.iter().filter(possible).copied().collect();
     let (beliefs, others): (Vec<&str>, Vec<&str>) = causes.iter().partition(|c| effects::BELIEFS.contains(c));
-    let list = if kind == Kind::Two {
+    let list = if kind == Kind::LooseSpring {
+        // The spring comes first: play is put into it.
+        let both = vec!["drive_compliance", "backlash"];
+        return both.iter().all(|cause| causes.contains(cause)).then_some(both);
+    } else if kind == Kind::Two {
         vec![random.pick(&causes), random.pick(&causes)]
     } else if kind == Kind::BeforeTable {
         let of = |is: fn(&str) -> bool| causes.iter().copied().filter(|c| is(c)).collect::<Vec<&str>>();
@@ -269,8 +276,8 @@ impl Case {
                 sizes.push(bench.fit(&mut effect, target, noise_may_move)?);
                 hidden.push(effect);
             }
-            Kind::Two | Kind::Beliefs | Kind::BeforeTable => {
-                let largest = if kind == Kind::BeforeTable { 40.0 } else { 8.0 };
+            Kind::Two | Kind::Beliefs | Kind::BeforeTable | Kind::LooseSpring => {
+                let largest = if kind == Kind::Two || kind == Kind::Beliefs { 8.0 } else { 40.0 };
                 for cause in together(kind, &bench.rig, random)? {
                     let mut effect = Effect::draw(cause, &bench.rig, bench.peak, random);
                     let target = random.log_uniform(1.5, largest);

@@ -239,7 +239,11 @@ impl Effect {
                 truth.presliding = self.amount / rig.unit;
                 truth.bristle_damping = form[0];
             }
-            "backlash" | "drive_compliance" => truth.coupling = Some(self.coupling(rig)),
+            "backlash" | "drive_compliance" => {
+                let own = self.coupling(rig);
+                let with_play = truth.coupling.map(|spring| Coupling { clearance: own.clearance, ..spring });
+                truth.coupling = Some(with_play.unwrap_or(own));
+            }
             "cogging" => truth.cogging = Sine { amplitude: self.amount, period: form[0], phase: form[1] },
             "position_dependent_friction" => truth.spot = (form[0], size, form[1], form[2]),
             "cable_force" => truth.cable = (size, form[0]),

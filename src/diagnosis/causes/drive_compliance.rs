@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 
 /// Damping ratio up to which a spring is looked for. Drives have a tenth of one and less; a fit that stops at this bound has
 /// found no swing, and imitates what else happens at reversals.
-const MOST_DAMPING: f64 = 0.3;
+pub(super) const MOST_DAMPING: f64 = 0.3;
 
 /// Share of the friction that the table has at most.
 const MOST_FRICTION: f64 = 1.0;
@@ -29,7 +29,7 @@ const FRICTION_SHARE: f64 = 0.7;
 /// The same of a light table that carries most of the friction, and of a heavy one that carries little.
 const SELDOM: [[f64; 2]; 2] = [[0.25, 0.8], [0.8, 0.4]];
 /// Damping ratio there.
-const DAMPING: f64 = 0.03;
+pub(super) const DAMPING: f64 = 0.03;
 /// The same where the rows do not tell it: drives have a tenth and less, and the more it is the less a simulated table is driven by
 /// the encoder's grid.
 const DAMPING_BY_MEANS: f64 = 0.1;
@@ -110,7 +110,7 @@ pub static BY_MEANS: Law = Law {
 const CONFUSED_WITH: &[Cause] = &[Cause::InertiaMismatch, Cause::Backlash, Cause::PreslidingFriction];
 
 /// The effect, if it is one of a drive that swings.
-fn swinging(frame: &Frame, shape: &[f64], _: &[f64]) -> Option<Effect> {
+pub(super) fn swinging(frame: &Frame, shape: &[f64], _: &[f64]) -> Option<Effect> {
     let swings = |found: &Effect| matches!(found, Effect::DriveCompliance { damping_ratio, .. } if *damping_ratio < 0.9 * MOST_DAMPING);
     effect(frame, shape).filter(swings)
 }
@@ -133,7 +133,8 @@ fn sentence(effect: &Effect, axis: &Axis) -> String {
     }
 }
 
-fn effect(frame: &Frame, shape: &[f64]) -> Option<Effect> {
+/// The effect of a table with its own frequency, share of the inertia, share of the friction over that, and own damping ratio.
+pub(super) fn effect(frame: &Frame, shape: &[f64]) -> Option<Effect> {
     let [own_hz, table_inertia_share, rubbing, own_damping]: [f64; 4] = shape.try_into().ok()?;
     let faster = (1.0 - table_inertia_share).sqrt().recip();
     let (resonance_hz, damping_ratio) = (own_hz * faster, own_damping * faster);

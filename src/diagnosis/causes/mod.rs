@@ -12,6 +12,7 @@ mod direction_dependent_friction;
 pub mod drive_compliance;
 mod external_vibration;
 mod inertia_mismatch;
+pub mod loose_spring;
 pub mod position_dependent_friction;
 mod quadratic_drag;
 mod screw_periodic_error;

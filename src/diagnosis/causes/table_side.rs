@@ -98,6 +98,9 @@ const LANES: usize = 8;
 const FEW: usize = 4;
 /// Radians of the fastest swing to a step: of a spring, whose swing is all that there is, and of flanks.
 const STEP_RAD: [f64; 2] = [0.12, 0.35];
+/// Time constants of a swing, 2·J₂/d each, times that two, until it is gone; and how long it takes flanks at most that are not a spring.
+const SWINGS: f64 = 3.0 * 2.0;
+const LONG_S: f64 = 0.04;
 /// Radians of a table's swing on the bristles of its friction over which their torque may be taken from half way.
 const MOST_BRISTLE_RAD: f64 = 0.7;
 
@@ -142,6 +145,8 @@ struct Tables<'a, const N: usize, R> {
     bristles: Option<Bristles<N>>,
     /// Whether there is a dead zone: flanks push and never pull.
     flanks: bool,
+    /// Behind flanks that meet so softly that they swing for long: those never move as one with the motor.
+    swings: [bool; N],
 }
 
 /// What resists tables at a row: the load of each and its largest dry friction, and that of a table with all of it.
@@ -182,6 +187,7 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
         let fastest = masses.iter().map(|m| (m.stiffness / m.table_inertia).sqrt().max(m.damping / m.table_inertia));
         let flanks = masses.iter().any(|m| m.clearance > 0.0);
         let radians = frame.columns.period_s * fastest.fold(0.0, f64::max);
+        let swings = of(|m| SWINGS * m.table_inertia / m.damping.max(1e-300)).map(|swing_s| swing_s > LONG_S);
         let steps = (radians / STEP_RAD[usize::from(flanks)]).ceil().clamp(1.0, 1000.0);
         let pieces = if flanks { 1.0 } else { (steps / MOST_STEPS).ceil() };
         let steps = pieces * (steps / pieces).ceil();
@@ -218,6 +224,7 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
                 .filter(|bristles| bristles.iter().all(swings_slower))
                 .map(|bristles| Bristles::new(bristles.map(|(friction, _)| friction))),
             flanks,
+            swings,
         }
     }
 

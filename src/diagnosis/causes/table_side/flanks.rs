@@ -64,7 +64,8 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
             for l in 0..N {
                 let both = smaller(load[l].abs(), next[l].abs());
                 // Near no load the flanks may part within the row.
-                firm[l] = steady & (both > 0.1 * self.share[l] * level[l]) & (load[l] * next[l] > 0.0);
+                firm[l] =
+                    steady & !self.swings[l] & (both > 0.1 * self.share[l] * level[l]) & (load[l] * next[l] > 0.0);
                 all_firm &= firm[l];
             }
             // In most rows of most tables this is all.
@@ -140,7 +141,8 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         let way = self.way(row);
         let (per_step, per_span) = (1.0 / self.steps as f64, 1.0 / self.frame.columns.period_s);
         let half_step = 0.5 * self.step_s;
-        let motor_mobility = self.motor_inertia.map(|j| self.step_s / j);
+        // What swings slower than the rows come is in the motor's measured way.
+        let motor_mobility = lanes::<N>(|l| if self.swings[l] { 0.0 } else { self.step_s / self.motor_inertia[l] });
         // Each step waits for the one before it: what does not depend on that is worked out beside it, not within.
         let pull: [f64; N] = lanes(|l| self.mobility[l] * resisting.load[l]);
         let slack = lanes::<N>(|l| self.stiffness[l] * self.half[l]);
@@ -222,8 +224,13 @@ mod tests {
     #[test]
     fn flanks_that_rest_on_each_other_are_not_parted_by_the_steps_of_the_encoder() {
         let axis = Machine::parse(include_str!("../../../../examples/machines/believed.json")).unwrap().axes.remove(0);
-        let clearance =
-            Effect::Backlash { width_um: 30.0, table_inertia_share: 0.5, table_friction_share: 0.5, contact_hz: 700.0 };
+        let clearance = Effect::Backlash {
+            width_um: 30.0,
+            table_inertia_share: 0.5,
+            table_friction_share: 0.5,
+            contact_hz: 700.0,
+            contact_damping_ratio: 0.3,
+        };
         for grid in [1e-3, 1e-6] {
             let columns = there_and_back(grid);
             let frame = Frame::new(&axis, &columns, Some(5));

@@ -1,0 +1,136 @@
+//! A spring that has play. A search that knows springs and clearances finds the one of them that does more, and what the other does is
+//! left or is made good by what has no part in it. So where much is left beside either, both together are tried in its place.
+//!
+//! The swing and the impacts make the sum of squares rugged: the two are approached on sums over shorter and shorter times. Sums over many
+//! swings tell how much is play and how much is wound up, and only short ones how heavy the table is.
+
+use super::causes::{Resistance, law, loose_spring};
+use super::fit::{Bench, Fit, Part};
+use super::judge::{Excess, LITTLE_LEFT};
+use super::many::dot;
+use super::progress::{Stopped, Watch};
+use super::select::{LEAST_GAIN, is_physical, price};
+use crate::machine::Cause;
+use std::sync::Arc;
+
+/// Times over which rows are summed, s, and how far apart the points of a slope are, in steps of each scale.
+const STAGES: [(f64, f64); 3] = [(0.05, 12.0), (0.02, 8.0), (0.006, 4.0)];
+/// Most moves in a stage.
+const MOVES: usize = 6;
+/// Masses of the table that are carried on.
+const CARRIED_ON: usize = 2;
+/// Most steps of a fit by itself, with all the others, and further ones of the best: its numbers lean on each other.
+const STEPS: [usize; 3] = [6, 4, 16];
+/// Frequency of contact, Hz, below which flanks that leave little may be a spring with play: hard ones are found at twice that and more.
+const SOFT_HZ: f64 = 300.0;
+/// Share of its squares that a spring must come down to with a little play for more to be tried.
+const LESS: f64 = 0.97;
+/// How hard flanks meet that both are compared with, Hz.
+const HARD_HZ: [f64; 3] = [900.0, 450.0, 220.0];
+/// What is said meanwhile.
+const STAGE: &str = "looking for play in a spring";
+
+/// The fit, or the same with both in the place of its spring or clearance.
+///
+/// # Errors
+/// [`Stopped`] when the watch's caller said so.
+pub fn added(bench: &Bench, fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
+    let left = Excess::of(bench, &fit, &fit).largest();
+    let open = |part: &Part| left > LITTLE_LEFT || left.ln_1p() > LEAST_GAIN && is_soft(part);
+    if !fit.table().map(|at| &fit.parts[at]).is_some_and(|part| !loose_spring::is(part) && open(part)) {
+        return Ok(fit);
+    }
+    // Friction that builds up may have stood in for the spring of a clearance.
+    let stands_in = fit.parts.iter().position(|part| part.law.manner.turns_table);
+    let without = stands_in.map(|i| bench.without(&fit, i));
+    let mut best: Option<Fit> = None;
+    for set in [Some(&fit), without.as_ref()].into_iter().flatten() {
+        let found = in_its_place(bench, set, watch)?;
+        best = best.into_iter().chain(found).min_by(|a, b| price(a).total_cmp(&price(b)));
+    }
+    let Some(both) = best.map(|best| bench.refine(best, 0, STEPS[2])).filter(|best| is_sound(bench, best)) else {
+        return Ok(fit);
+    };
+    // Hard flanks that a coarse recording smears look soft.
+    let hard = watch.each(&HARD_HZ, (0.9, 0.9), STAGE, |hz| with_hard_flanks(bench, &both, *hz))?;
+    let one = hard.into_iter().flatten().chain([fit]).min_by(|a, b| price(a).total_cmp(&price(b)));
+    // Both are a cause more.
+    Ok(one.filter(|one| price(one) - LEAST_GAIN <= price(&both)).unwrap_or(both))
+}
+
+/// The same with flanks that meet so hard in the place of the spring.
+fn with_hard_flanks(bench: &Bench, both: &Fit, hz: f64) -> Option<Fit> {
+    let at = both.table()?;
+    let shape = loose_spring::with_hard_flanks(&both.parts[at].shape, hz)?;
+    let others: Vec<Part> = bench.without(both, at).parts;
+    let own = bench.parts_under(law(Cause::Backlash), vec![shape], &bench.resistance_of(both));
+    let start = bench.fit(others.iter().cloned().chain(own).collect());
+    let fit = bench.refine(bench.refine_roughly(start, others.len(), STEPS[0]), 0, STEPS[1]);
+    is_sound(bench, &fit).then_some(fit)
+}
+
+/// Whether a table is behind a spring, or behind flanks that meet as if they were one.
+fn is_soft(part: &Part) -> bool {
+    part.law.cause == Cause::DriveCompliance || part.shape.last().is_some_and(|contact_hz| *contact_hz < SOFT_HZ)
+}
+
+fn is_sound(bench: &Bench, fit: &Fit) -> bool {
+    fit.squares().is_finite() && is_physical(bench, fit)
+}
+
+/// A spring with play in the place of a set's spring or clearance.
+fn in_its_place(bench: &Bench, set: &Fit, watch: &Watch) -> Result<Option<Fit>, Stopped> {
+    let masses = || {
+        let part = &set.parts[set.table()?];
+        let effect = part.law.effect(bench.frame, &part.shape, &[])?;
+        bench.frame.axis.with_effects(vec![effect]).two_masses().ok()?
+    };
+    let Some(masses) = masses() else { return Ok(None) };
+    let others: Vec<Part> = set.parts.iter().filter(|part| !part.law.is_simulated()).cloned().collect();
+    let (beside, resistance) = (bench.fit(others.clone()), bench.resistance_of(set));
+    let with = |own: Part| bench.fit(others.iter().cloned().chain([own]).collect());
+    // A spring that has play leaves less with a little of it, once its other numbers have made room for that.
+    if let Some(little) = loose_spring::with_little_play(bench.frame, &masses) {
+        let starts = bench.parts_under(&loose_spring::LAW, little, &resistance).into_iter().map(with);
+        let Some(start) = starts.min_by(|a, b| a.squares().total_cmp(&b.squares())) else { return Ok(None) };
+        if bench.refine_roughly(start, others.len(), STEPS[1]).squares() > LESS * set.squares() {
+            return Ok(None);
+        }
+    }
+    let [first, finer @ ..] = STAGES.map(|(seconds, steps)| (bench.smoothed(seconds), steps));
+    let approached = |(sums, steps): &(Bench, f64), shapes| approached(sums, *steps, &beside, shapes, &resistance);
+    let Some((_, there)) = approached(&first, loose_spring::starts(bench.frame, &masses)) else {
+        return Ok(None);
+    };
+    let there = watch.each(&loose_spring::of_any_mass(&there), (0.9, 0.9), STAGE, |shape| {
+        finer.iter().try_fold((0.0, shape.clone()), |(_, shape), stage| approached(stage, vec![shape]))
+    })?;
+    let mut there: Vec<(f64, Vec<f64>)> = there.into_iter().flatten().collect();
+    there.sort_by(|a, b| a.0.total_cmp(&b.0));
+    there.truncate(CARRIED_ON);
+    let fits = watch.each(&there, (0.9, 0.9), STAGE, |(_, shape)| {
+        let start = with(bench.parts_under(&loose_spring::LAW, vec![shape.clone()], &resistance).swap_remove(0));
+        bench.refine(bench.refine_roughly(start, others.len(), STEPS[0]), 0, STEPS[1])
+    })?;
+    Ok(fits.into_iter().filter(|fit| is_sound(bench, fit)).min_by(|a, b| price(a).total_cmp(&price(b))))
+}
+
+/// Squares that are left, and where the best of some starts leads on sums.
+fn approached(
+    sums: &Bench,
+    steps: f64,
+    beside: &Fit,
+    shapes: Vec<Vec<f64>>,
+    resistance: &Arc<Resistance>,
+) -> Option<(f64, Vec<f64>)> {
+    let there = sums.again(beside);
+    let squares = |part: &Part| {
+        let left = sums.left_beside(&there, part);
+        dot(&left, &left)
+    };
+    let parts = sums.parts_under(&loose_spring::LAW, shapes, resistance).into_iter();
+    let rated = parts.map(|part| (squares(&part), part)).filter(|(squares, _)| squares.is_finite());
+    let (_, nearest) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let part = sums.approached(&there, nearest, steps, MOVES);
+    Some((squares(&part), part.shape))
+}
