@@ -76,7 +76,7 @@ bench: build ## instructions per step, printed
 # 64 cases take some five minutes on two busy cores; CASES= and SEED= (the clock where left out) for others.
 scoreboard: build ## hide effects in random machines and score what gib diagnose says
 	$(CARGO) build --profile $(PROFILE) --example scoreboard
-	$(RELEASE)/examples/scoreboard --gib $(RELEASE)/gib --longest 40 --cases $(or $(CASES),64) $(if $(SEED),--seed $(SEED))
+	$(RELEASE)/examples/scoreboard --gib $(RELEASE)/gib --longest 40 --cases $(or $(CASES),64) $(if $(SEED),--seed $(SEED)) $(if $(CAUSE),--cause $(CAUSE))
 
 install: build ## into $(DESTDIR)$(PREFIX)
 	$(INSTALL) -d $(addprefix $(DESTDIR),$(INCLUDEDIR) $(LIBDIR)/pkgconfig $(BINDIR) $(DOCDIR))

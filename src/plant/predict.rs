@@ -253,6 +253,10 @@ pub(super) fn rows_for_phases(motion: &Motion) -> usize {
     quarter.max(motion.position.len() / 4)
 }
 
+/// Share by which a base value may be wrong where a phase is estimated; of viscous friction also what that share of the dry one is at full
+/// speed.
+const WRONG: f64 = 0.3;
+
 /// Estimates the phases of cogging and vibration from the rows for phases in which the axis moves; a ripple of which these show
 /// less than half a period is silenced. Returns how many.
 fn set_phases(physics: &mut Physics, observed: &Observed, delivered: &[f64], by_rows: f64) -> usize {
@@ -281,7 +285,8 @@ fn set_phases(physics: &mut Physics, observed: &Observed, delivered: &[f64], by_
     let ripples: Vec<Ripple> = physics.cogging.iter().chain(&physics.vibration).copied().collect();
     let shown = |k: &usize| (reach[*k].1 - reach[*k].0) * ripples[*k].wave >= std::f64::consts::PI;
     let shown: Vec<usize> = (0..count).filter(shown).collect();
-    // A wrong base value must not turn the phase: it is let free beside the ripples.
+    // A wrong base value must not turn the phase: it is let free beside the ripples, as far as one may be wrong. At a steady speed what
+    // moves is the ripple's own answer, and the servo's to the encoder's noise, by which any base value would do.
     let mut balance = Balance::of(4 + 2 * shown.len());
     for (i, left) in rows() {
         let v = motion.velocity(i);
@@ -293,7 +298,15 @@ fn set_phases(physics: &mut Physics, observed: &Observed, delivered: &[f64], by_
         });
         balance.add(nuisance.into_iter().chain(waves), left);
     }
-    let weights = balance.weights();
+    let fastest = motion.velocities().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
+    let (scale, coulomb) = (physics.motor_per_load, physics.coulomb());
+    let bounds = [
+        coulomb + physics.constant_torque().abs(),
+        WRONG * (scale * physics.slope_at(0.0) + coulomb / fastest.max(standing)),
+        WRONG * coulomb,
+        WRONG * scale * physics.inertia,
+    ];
+    let weights = balance.weights_within(&bounds);
     for (k, ripple) in physics.cogging.iter_mut().chain(&mut physics.vibration).enumerate() {
         match (shown.iter().position(|shown| *shown == k), &weights) {
             (None, _) => ripple.amplitude = 0.0,
@@ -356,6 +369,33 @@ impl Balance {
             self.with_target[i] += a * target;
         }
         self.rows += 1;
+    }
+
+    /// The same with the first of them within bounds: the one that is farthest beyond its own is put there, until none is.
+    fn weights_within(&self, bounds: &[f64]) -> Option<Vec<f64>> {
+        let mut given: Vec<Option<f64>> = vec![None; self.with_target.len()];
+        loop {
+            let open: Vec<usize> = (0..given.len()).filter(|i| given[*i].is_none()).collect();
+            let product = |i: usize, j: usize| self.products[(i.max(j), i.min(j))];
+            let taken =
+                |i: usize| given.iter().enumerate().filter_map(|(j, w)| Some(product(i, j) * (*w)?)).sum::<f64>();
+            let rest = Self {
+                products: DMatrix::from_fn(open.len(), open.len(), |i, j| product(open[i], open[j])),
+                with_target: DVector::from_fn(open.len(), |i, _| self.with_target[open[i]] - taken(open[i])),
+                rows: self.rows,
+                row: Vec::new(),
+            };
+            let found = rest.weights()?;
+            let beyond = |&(&i, w): &(&usize, &f64)| bounds.get(i).is_some_and(|bound| w.abs() > *bound);
+            let ratio = |&(&i, w): &(&usize, &f64)| w.abs() / bounds[i].max(1e-300);
+            match open.iter().zip(&found).filter(beyond).max_by(|a, b| ratio(a).total_cmp(&ratio(b))) {
+                Some((&i, w)) => given[i] = Some(bounds[i].copysign(*w)),
+                None => {
+                    open.iter().zip(found).for_each(|(&i, w)| given[i] = Some(w));
+                    return given.into_iter().collect();
+                }
+            }
+        }
     }
 
     /// Weights of the columns that come closest to the target; columns are scaled first, and useless ones get nothing.
