@@ -59,3 +59,27 @@ fn the_phase_of_a_vibration_is_had_from_motion() {
         assert!((0.9..1.2).contains(&left), "{left}");
     }
 }
+
+/// A recording whose first quarter is one slow way there and back, on which nothing moves but what the vibration makes of it.
+fn after_a_slow_way(random: &mut Random) -> (Vec<Segment>, f64) {
+    let (ways, _) = fast_ways(random);
+    let slow = [63.0, 60.0].map(|to| Segment::Move { to, speed: 0.5, acceleration: 1000.0 });
+    (slow.into_iter().chain(ways).collect(), 30.0)
+}
+
+/// At a steady speed what moves is the vibration's own answer: a base value that were wrong by several times itself would explain it as
+/// well.
+#[test]
+fn a_vibration_keeps_its_phase_where_nothing_else_moves() {
+    for (seed, phase) in [(58, 0.4), (59, 2.9)] {
+        let parameters = json!({"frequency_hz": 17.0, "amplitude_nm": 0.03});
+        let shakes = json!({"cause": "external_vibration", "parameters": parameters});
+        let figures = predicted(after_a_slow_way, vec![shakes], &fine(), seed, |truth| {
+            truth.vibration = Sine { amplitude: 0.03, period: 1.0 / 17.0, phase };
+        });
+        let (left, position_um) =
+            (left_while_moving(&figures, &fine()), figures["residual_position_rms_um"].as_f64().unwrap());
+        println!("seed {seed}: {left:.2} of the noise, position {position_um:.2} um");
+        assert!((0.9..1.35).contains(&left) && position_um < 0.8, "{left} {position_um}");
+    }
+}
