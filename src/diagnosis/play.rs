@@ -4,7 +4,7 @@
 //! The swing and the impacts make the sum of squares rugged: the two are approached on sums over shorter and shorter times. Sums over many
 //! swings tell how much is play and how much is wound up, and only short ones how heavy the table is.
 
-use super::causes::{Resistance, law, loose_spring};
+use super::causes::{Law, Resistance, law, loose_spring};
 use super::fit::{Bench, Fit, Part};
 use super::judge::{Excess, LITTLE_LEFT};
 use super::many::dot;
@@ -30,14 +30,17 @@ const HARD_HZ: [f64; 3] = [900.0, 450.0, 220.0];
 /// What is said meanwhile.
 const STAGE: &str = "looking for play in a spring";
 
-/// The fit, or the same with both in the place of its spring or clearance.
+/// The fit, or the same with both in the place of its spring or clearance, where both are among these laws: what is believed is not
+/// found again.
 ///
 /// # Errors
 /// [`Stopped`] when the watch's caller said so.
-pub fn added(bench: &Bench, fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
+pub fn added(bench: &Bench, laws: &[&'static Law], fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
+    let may_be_both = laws.iter().filter(|law| law.is_simulated()).count() > 1;
     let left = Excess::of(bench, &fit, &fit).largest();
     let open = |part: &Part| left > LITTLE_LEFT || left.ln_1p() > LEAST_GAIN && is_soft(part);
-    if !fit.table().map(|at| &fit.parts[at]).is_some_and(|part| !loose_spring::is(part) && open(part)) {
+    let table = fit.table().map(|at| &fit.parts[at]).filter(|part| may_be_both && !loose_spring::is(part));
+    if !table.is_some_and(open) {
         return Ok(fit);
     }
     // Friction that builds up may have stood in for the spring of a clearance.

@@ -160,7 +160,7 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     let start = if price(&open) < price(&start) { open } else { start };
     let fit = shrink(search.bench, start, search.watch)?;
     let fit = valleys::settled(search.bench, search.laws, fit, search.watch)?;
-    let mut fit = play::added(search.bench, fit, search.watch)?;
+    let mut fit = play::added(search.bench, search.laws, fit, search.watch)?;
     // What stood in for the play of a spring, or for the spring of a clearance, is not needed beside both.
     if fit.parts.iter().any(loose_spring::is) {
         fit = shrink(search.bench, fit, search.watch)?;
@@ -179,7 +179,7 @@ fn at_the_bottom(search: &Search, fit: &Fit) -> Result<Fit, Stopped> {
     }
     let refined = search.bench.refine(fit.clone(), 0, 8);
     let refined = valleys::settled(search.bench, search.laws, refined, search.watch)?;
-    let refined = play::added(search.bench, refined, search.watch)?;
+    let refined = play::added(search.bench, search.laws, refined, search.watch)?;
     Ok(if is_physical(search.bench, &refined) { refined } else { fit.clone() })
 }
 
