@@ -138,6 +138,15 @@ fn half_a_row_of_an_unknown_servo_is_no_dead_time() {
     }
 }
 
+/// An elastic drive whose table carries most of the friction.
+const SPRING: Effect = Effect::DriveCompliance {
+    resonance_hz: 55.0,
+    stiffness_n_um: 30.0,
+    table_inertia_share: 0.5,
+    table_friction_share: 0.7,
+    damping_ratio: 0.05,
+};
+
 /// Found, written to a machine file, simulated from that file, and diagnosed against it: nothing is left to be said.
 #[test]
 fn what_was_found_and_simulated_again_is_no_discrepancy() {
@@ -153,15 +162,8 @@ fn what_was_found_and_simulated_again_is_no_discrepancy() {
         contact_hz: 900.0,
         contact_damping_ratio: 0.3,
     };
-    let spring = Effect::DriveCompliance {
-        resonance_hz: 55.0,
-        stiffness_n_um: 30.0,
-        table_inertia_share: 0.5,
-        table_friction_share: 0.7,
-        damping_ratio: 0.05,
-    };
     let loose = Effect::from_values(Cause::Backlash, &[20.0]).unwrap();
-    for hidden in [several, vec![clearance], vec![spring], vec![loose, spring]] {
+    for hidden in [several, vec![clearance], vec![SPRING], vec![loose, SPRING]] {
         let first = recorded(&rig(&hidden), &test_moves(), 3);
         let d = judged(&rig(&[]), &first);
         let mut found = named(&d);
@@ -184,15 +186,8 @@ fn what_was_found_and_simulated_again_is_no_discrepancy() {
 /// none of it: by the right machine the table is where its scale has it.
 #[test]
 fn what_a_load_winds_up_is_not_taken_for_the_zero_of_the_scale() {
-    let spring = Effect::DriveCompliance {
-        resonance_hz: 60.0,
-        stiffness_n_um: 30.0,
-        table_inertia_share: 0.5,
-        table_friction_share: 0.7,
-        damping_ratio: 0.05,
-    };
     let cable = Effect::CableForce { slope: 0.01, zero_mm: -40.0 };
-    let d = judged(&rig(&[]), &recorded_by(&rig(&[spring, cable]), &test_moves(), 3, good(0.03), true));
+    let d = judged(&rig(&[]), &recorded_by(&rig(&[SPRING, cable]), &test_moves(), 3, good(0.03), true));
     let table = d.gains.iter().find(|gain| gain.channel == "table_position").unwrap();
     assert!(table.before > 3e-3 && table.after < 0.02 * table.before, "{table:?}");
 }

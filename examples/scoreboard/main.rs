@@ -24,8 +24,8 @@ struct Options {
     /// Seed; the clock where left out. It is printed, and repeats the run.
     #[arg(long)]
     seed: Option<u64>,
-    /// Hide only this: a cause, an outside effect, `none`, `two`, `beliefs`, `loose_spring` (an elastic drive with play) or `before_table` (a spring or a clearance beside a friction
-    /// or a load).
+    /// Hide only this: a cause, an outside effect, `none`, `two`, `beliefs`, `loose_spring` (an elastic drive with play) or `before_table`
+    /// (a spring or a clearance beside a friction or a load).
     #[arg(long)]
     cause: Option<String>,
     /// Only the case of this number.

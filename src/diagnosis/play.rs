@@ -4,7 +4,7 @@
 //! The swing and the impacts make the sum of squares rugged: the two are approached on sums over shorter and shorter times. Sums over many
 //! swings tell how much is play and how much is wound up, and only short ones how heavy the table is.
 
-use super::causes::{Law, Resistance, law, loose_spring};
+use super::causes::{Law, Resistance, law, loose_spring, table_side};
 use super::fit::{Bench, Fit, Part};
 use super::judge::{Excess, LITTLE_LEFT};
 use super::many::dot;
@@ -83,12 +83,9 @@ fn is_sound(bench: &Bench, fit: &Fit) -> bool {
 
 /// A spring with play in the place of a set's spring or clearance.
 fn in_its_place(bench: &Bench, set: &Fit, watch: &Watch) -> Result<Option<Fit>, Stopped> {
-    let masses = || {
-        let part = &set.parts[set.table()?];
-        let effect = part.law.effect(bench.frame, &part.shape, &[])?;
-        bench.frame.axis.with_effects(vec![effect]).two_masses().ok()?
-    };
-    let Some(masses) = masses() else { return Ok(None) };
+    let table = set.table().map(|at| &set.parts[at]);
+    let effect = table.and_then(|part| part.law.effect(bench.frame, &part.shape, &[]));
+    let Some(masses) = table_side::split(bench.frame, effect) else { return Ok(None) };
     let others: Vec<Part> = set.parts.iter().filter(|part| !part.law.is_simulated()).cloned().collect();
     let (beside, resistance) = (bench.fit(others.clone()), bench.resistance_of(set));
     let with = |own: Part| bench.fit(others.iter().cloned().chain([own]).collect());

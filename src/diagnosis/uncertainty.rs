@@ -184,12 +184,9 @@ pub fn effects(bench: &Bench, fit: &Fit, sure: Option<&Sure>) -> Vec<Option<(Eff
                 let by_coefficients =
                     own.clone().zip(&fit.coefficients[i]).map(|(u, c)| (gradient[(k, u)] * c).powi(2)).sum::<f64>();
                 // What no unknown moves was not found.
-                let found_at_all = gradient.row(k).iter().any(|by| *by != 0.0);
-                let size = match own.is_empty() {
-                    true if found_at_all => values[k].abs(),
-                    true => 0.0,
-                    false => by_coefficients.sqrt(),
-                };
+                let moves = gradient.row(k).iter().any(|by| *by != 0.0);
+                let alone = if moves { values[k].abs() } else { 0.0 };
+                let size = if own.is_empty() { alone } else { by_coefficients.sqrt() };
                 let found = deviation_of(part, &gradient.row(k).transpose()).hypot(LAW_HOLDS * size);
                 ends.iter().fold(found, |all, (unknown, range)| all.hypot(gradient[(k, *unknown)] * range))
             };

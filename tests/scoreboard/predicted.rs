@@ -45,16 +45,20 @@ fn after_a_rest(random: &mut Random) -> (Vec<Segment>, f64) {
     ([rest].into_iter().chain(ways).collect(), 30.0)
 }
 
+/// What is said of a machine that is shaken so much, along such ways.
+fn shaken(ways: fn(&mut Random) -> (Vec<Segment>, f64), amplitude: f64, seed: u64, phase: f64) -> serde_json::Value {
+    let parameters = json!({"frequency_hz": 17.0, "amplitude_nm": amplitude});
+    let shakes = json!({"cause": "external_vibration", "parameters": parameters});
+    predicted(ways, vec![shakes], &fine(), seed, |truth| {
+        truth.vibration = Sine { amplitude, period: 1.0 / 17.0, phase };
+    })
+}
+
 /// A resting axis tells nothing of a vibration's phase: it is taken from where the axis moves.
 #[test]
 fn the_phase_of_a_vibration_is_had_from_motion() {
     for (seed, phase) in [(56, 0.4), (57, 2.9)] {
-        let parameters = json!({"frequency_hz": 17.0, "amplitude_nm": 0.15});
-        let shakes = json!({"cause": "external_vibration", "parameters": parameters});
-        let figures = predicted(after_a_rest, vec![shakes], &fine(), seed, |truth| {
-            truth.vibration = Sine { amplitude: 0.15, period: 1.0 / 17.0, phase };
-        });
-        let left = left_while_moving(&figures, &fine());
+        let left = left_while_moving(&shaken(after_a_rest, 0.15, seed, phase), &fine());
         println!("seed {seed}: {left:.2} of the noise");
         assert!((0.9..1.2).contains(&left), "{left}");
     }
@@ -67,18 +71,13 @@ fn after_a_slow_way(random: &mut Random) -> (Vec<Segment>, f64) {
     (slow.into_iter().chain(ways).collect(), 30.0)
 }
 
-/// At a steady speed what moves is the vibration's own answer: a base value that were wrong by several times itself would explain it as
-/// well.
+/// At a steady speed what moves is the vibration's own answer: a base value that is wrong by several times itself would explain it as well.
 #[test]
 fn a_vibration_keeps_its_phase_where_nothing_else_moves() {
     for (seed, phase) in [(58, 0.4), (59, 2.9)] {
-        let parameters = json!({"frequency_hz": 17.0, "amplitude_nm": 0.03});
-        let shakes = json!({"cause": "external_vibration", "parameters": parameters});
-        let figures = predicted(after_a_slow_way, vec![shakes], &fine(), seed, |truth| {
-            truth.vibration = Sine { amplitude: 0.03, period: 1.0 / 17.0, phase };
-        });
-        let (left, position_um) =
-            (left_while_moving(&figures, &fine()), figures["residual_position_rms_um"].as_f64().unwrap());
+        let figures = shaken(after_a_slow_way, 0.03, seed, phase);
+        let position_um = figures["residual_position_rms_um"].as_f64().unwrap();
+        let left = left_while_moving(&figures, &fine());
         println!("seed {seed}: {left:.2} of the noise, position {position_um:.2} um");
         assert!((0.9..1.35).contains(&left) && position_um < 0.8, "{left} {position_um}");
     }

@@ -12,9 +12,6 @@ const LEAST: f64 = 3e-4;
 /// A width over the one looked for before it, at most.
 const NEXT: f64 = 1.6;
 
-/// Damping ratio of flanks that meet.
-const CONTACT_DAMPING: f64 = 0.3;
-
 /// Parameters: full width in µm, shares of inertia and friction on the table's side, how stiff the flanks meet
 /// in Hz. The trace has no coefficient.
 pub static LAW: Law = Law {
@@ -59,7 +56,5 @@ fn of_width(width: f64) -> impl Iterator<Item = Vec<f64>> {
 }
 
 fn effect(shape: &[f64]) -> Option<Effect> {
-    let [width_um, table_inertia_share, table_friction_share, contact_hz] = shape.try_into().ok()?;
-    let contact_damping_ratio = CONTACT_DAMPING;
-    Some(Effect::Backlash { width_um, table_inertia_share, table_friction_share, contact_hz, contact_damping_ratio })
+    Effect::from_values(Cause::Backlash, shape)
 }

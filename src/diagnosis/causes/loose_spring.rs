@@ -107,7 +107,7 @@ pub fn said_as(fit: &Fit, part: usize, law: &'static Law) -> Fit {
 /// Share of the play in what the table loses at a reversal.
 #[must_use]
 pub fn share_of_play(frame: &Frame, shape: &[f64]) -> f64 {
-    let masses = both(frame, shape).and_then(|both| frame.axis.with_effects(vec![both]).two_masses().ok().flatten());
+    let masses = table_side::split(frame, both(frame, shape));
     masses.map_or(0.5, |masses| masses.clearance / lost(frame, &masses).max(1e-300))
 }
 

@@ -45,8 +45,8 @@ pub fn terms_under_each(frame: &Frame, resistances: &[&Resistance], effect: Opti
     resistances.par_chunks(FEW).flat_map_iter(together).collect()
 }
 
-/// Motor and table of an axis with an effect.
-fn split(frame: &Frame, effect: Option<Effect>) -> Option<TwoMasses> {
+/// Motor and table of an axis with an effect; `None` where it has none or it sets nothing apart.
+pub fn split(frame: &Frame, effect: Option<Effect>) -> Option<TwoMasses> {
     frame.axis.with_effects(vec![effect?]).two_masses().ok().flatten()
 }
 
@@ -68,7 +68,7 @@ pub fn swing_of(masses: &TwoMasses) -> Vec<f64> {
 /// Standard deviation of a spring's damping ratio by what nobody knows: viscous friction may act on the motor or on the table, where
 /// it damps the table's swing as the spring's own damping does, and need not be shared as dry friction is.
 pub fn open_damping(frame: &Frame, effect: &Effect) -> f64 {
-    let Ok(Some(m)) = frame.axis.with_effects(vec![*effect]).two_masses() else { return 0.0 };
+    let Some(m) = split(frame, Some(*effect)) else { return 0.0 };
     // Any share of it on the table alike.
     let viscous = frame.belief.viscous * (1.0 / 12.0 + (m.table_friction_share - 0.5).powi(2)).sqrt();
     let swing = (m.stiffness * m.table_inertia).sqrt();
@@ -98,8 +98,8 @@ const LANES: usize = 8;
 const FEW: usize = 4;
 /// Radians of the fastest swing to a step: of a spring, whose swing is all that there is, and of flanks.
 const STEP_RAD: [f64; 2] = [0.12, 0.35];
-/// Time constants of a swing, 2·J₂/d each, times that two, until it is gone; and how long it takes flanks at most that are not a spring.
-const SWINGS: f64 = 3.0 * 2.0;
+/// Time constants of a swing until it is gone, and for how long flanks that are no spring swing at most, s.
+const SWINGS: f64 = 3.0;
 const LONG_S: f64 = 0.04;
 /// Radians of a table's swing on the bristles of its friction over which their torque may be taken from half way.
 const MOST_BRISTLE_RAD: f64 = 0.7;
@@ -187,7 +187,8 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
         let fastest = masses.iter().map(|m| (m.stiffness / m.table_inertia).sqrt().max(m.damping / m.table_inertia));
         let flanks = masses.iter().any(|m| m.clearance > 0.0);
         let radians = frame.columns.period_s * fastest.fold(0.0, f64::max);
-        let swings = of(|m| SWINGS * m.table_inertia / m.damping.max(1e-300)).map(|swing_s| swing_s > LONG_S);
+        let swings =
+            of(|m| 2.0 * m.table_inertia / m.damping.max(1e-300)).map(|constant_s| SWINGS * constant_s > LONG_S);
         let steps = (radians / STEP_RAD[usize::from(flanks)]).ceil().clamp(1.0, 1000.0);
         let pieces = if flanks { 1.0 } else { (steps / MOST_STEPS).ceil() };
         let steps = pieces * (steps / pieces).ceil();
