@@ -13,17 +13,16 @@ use super::select::{LEAST_GAIN, is_physical, price};
 use crate::machine::Cause;
 use std::sync::Arc;
 
-/// Times over which rows are summed, s, and how far apart the points of a slope are, in steps of each scale.
-const STAGES: [(f64, f64); 3] = [(0.05, 12.0), (0.02, 8.0), (0.006, 4.0)];
-/// Most moves in a stage.
-const MOVES: usize = 6;
+/// Times over which rows are summed, s, how far apart the points of a slope are, in steps of each scale, and most moves.
+const STAGES: [(f64, f64, usize); 3] = [(0.05, 12.0, 24), (0.02, 8.0, 6), (0.006, 4.0, 6)];
 /// Masses of the table that are carried on.
 const CARRIED_ON: usize = 2;
 /// Most steps of a fit by itself, with all the others, and further ones of the best: its numbers lean on each other.
 const STEPS: [usize; 3] = [6, 4, 16];
 /// Frequency of contact, Hz, below which flanks that leave little may be a spring with play: hard ones are found at twice that and more.
 const SOFT_HZ: f64 = 300.0;
-/// Share of its squares that a spring must come down to with a little play for more to be tried.
+/// Share of its squares that a spring must come down to with a little play for more to be tried, and of those that a set leaves on the
+/// first sums where that cannot be asked of friction that builds up.
 const LESS: f64 = 0.97;
 /// How hard flanks meet that both are compared with, Hz.
 const HARD_HZ: [f64; 3] = [900.0, 450.0, 220.0];
@@ -48,7 +47,7 @@ pub fn added(bench: &Bench, laws: &[&'static Law], fit: Fit, watch: &Watch) -> R
     let without = stands_in.map(|i| bench.without(&fit, i));
     let mut best: Option<Fit> = None;
     for set in [Some(&fit), without.as_ref()].into_iter().flatten() {
-        let found = in_its_place(bench, set, watch)?;
+        let found = in_its_place(bench, &fit, set, watch)?;
         best = best.into_iter().chain(found).min_by(|a, b| price(a).total_cmp(&price(b)));
     }
     let Some(both) = best.map(|best| bench.refine(best, 0, STEPS[2])).filter(|best| is_sound(bench, best)) else {
@@ -81,8 +80,8 @@ fn is_sound(bench: &Bench, fit: &Fit) -> bool {
     fit.squares().is_finite() && is_physical(bench, fit)
 }
 
-/// A spring with play in the place of a set's spring or clearance.
-fn in_its_place(bench: &Bench, set: &Fit, watch: &Watch) -> Result<Option<Fit>, Stopped> {
+/// A spring with play in the place of the spring or clearance of a set, which is what was found or a part of it.
+fn in_its_place(bench: &Bench, found: &Fit, set: &Fit, watch: &Watch) -> Result<Option<Fit>, Stopped> {
     let table = set.table().map(|at| &set.parts[at]);
     let effect = table.and_then(|part| part.law.effect(bench.frame, &part.shape, &[]));
     let Some(masses) = table_side::split(bench.frame, effect) else { return Ok(None) };
@@ -90,18 +89,25 @@ fn in_its_place(bench: &Bench, set: &Fit, watch: &Watch) -> Result<Option<Fit>, 
     let (beside, resistance) = (bench.fit(others.clone()), bench.resistance_of(set));
     let with = |own: Part| bench.fit(others.iter().cloned().chain([own]).collect());
     // A spring that has play leaves less with a little of it, once its other numbers have made room for that.
-    if let Some(little) = loose_spring::with_little_play(bench.frame, &masses) {
+    let whole = set.parts.len() == found.parts.len();
+    let little = loose_spring::with_little_play(bench.frame, &masses).filter(|_| whole);
+    // Tables beside friction that builds up take long, and leave much for other reasons.
+    let in_doubt = little.is_none() && found.parts.iter().any(|part| part.law.manner.turns_table);
+    if let Some(little) = little {
         let starts = bench.parts_under(&loose_spring::LAW, little, &resistance).into_iter().map(with);
         let Some(start) = starts.min_by(|a, b| a.squares().total_cmp(&b.squares())) else { return Ok(None) };
         if bench.refine_roughly(start, others.len(), STEPS[1]).squares() > LESS * set.squares() {
             return Ok(None);
         }
     }
-    let [first, finer @ ..] = STAGES.map(|(seconds, steps)| (bench.smoothed(seconds), steps));
-    let approached = |(sums, steps): &(Bench, f64), shapes| approached(sums, *steps, &beside, shapes, &resistance);
-    let Some((_, there)) = approached(&first, loose_spring::starts(bench.frame, &masses)) else {
+    let [first, finer @ ..] = STAGES.map(|(seconds, steps, moves)| (bench.smoothed(seconds), (steps, moves)));
+    let approached = |(sums, going): &(Bench, _), shapes| approached(sums, *going, &beside, shapes, &resistance);
+    let Some((left, there)) = approached(&first, loose_spring::starts(bench.frame, &masses)) else {
         return Ok(None);
     };
+    if in_doubt && left > LESS * first.0.again(found).squares() {
+        return Ok(None);
+    }
     let there = watch.each(&loose_spring::of_any_mass(&there), (0.9, 0.9), STAGE, |shape| {
         finer.iter().try_fold((0.0, shape.clone()), |(_, shape), stage| approached(stage, vec![shape]))
     })?;
@@ -118,7 +124,7 @@ fn in_its_place(bench: &Bench, set: &Fit, watch: &Watch) -> Result<Option<Fit>, 
 /// Squares that are left, and where the best of some starts leads on sums.
 fn approached(
     sums: &Bench,
-    steps: f64,
+    (steps, moves): (f64, usize),
     beside: &Fit,
     shapes: Vec<Vec<f64>>,
     resistance: &Arc<Resistance>,
@@ -131,6 +137,6 @@ fn approached(
     let parts = sums.parts_under(&loose_spring::LAW, shapes, resistance).into_iter();
     let rated = parts.map(|part| (squares(&part), part)).filter(|(squares, _)| squares.is_finite());
     let (_, nearest) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let part = sums.approached(&there, nearest, steps, MOVES);
+    let part = sums.approached(&there, nearest, steps, moves);
     Some((squares(&part), part.shape))
 }
