@@ -10,10 +10,12 @@
 
 mod itself;
 mod replays;
+mod sharper;
 mod trial;
 
 pub(super) use itself::settled;
 pub(super) use replays::{Over, mean, mean_of_worse_half, misses, strength};
+pub(super) use sharper::sharpened;
 
 use super::belief;
 use super::causes::{ABOUT_REVERSALS, LAWS, Law, law};
@@ -32,6 +34,7 @@ use super::verdict::{Diagnosis, Finding, Verdict, confidence};
 use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::added::ByServo;
+use crate::plant::observed::Observed;
 use itself::Itself;
 use replays::{NOTHING, Replays};
 use trial::{Refined, Trial, starts};
@@ -90,13 +93,30 @@ pub fn completed(
     let Some(replays) = Replays::new(recording, known, watch) else { return Ok(found) };
     let told = told(axis, &replays, (frame, whole), [&found.extended, &without], watch)?;
     let Some(told) = told.filter(|told| !doubtful.contains(&told.finding.effect.cause())) else { return Ok(found) };
-    let extended = belief::extended(&without, &[told.finding.effect]);
+    let mut stays = found.clone();
+    stays.findings.retain(|finding| !doubtful.contains(&finding.effect.cause()));
+    let rest = 1.0 - stays.findings.iter().map(|finding| finding.share).sum::<f64>().min(1.0);
+    let told = Told { finding: Finding { share: rest * told.finding.share, ..told.finding }, ..told };
+    let retold = answered(axis, (recording, holdout), frame, (&replays, &without), (stays, told), watch)?;
+    Ok(retold.unwrap_or(found))
+}
+
+/// The answer that stays with what the loop tells beside its machine; `None` where a hold-out refutes that.
+fn answered(
+    axis: &Axis,
+    (recording, holdout): ((&Observed, &ByServo), Option<&Excerpt>),
+    frame: &Frame,
+    (replays, without): (&Replays, &Axis),
+    (mut stays, told): (Diagnosis, Told),
+    watch: &Watch,
+) -> Result<Option<Diagnosis>, Stopped> {
+    let extended = belief::extended(without, &[told.finding.effect]);
     let elsewhere = holdout.and_then(|holdout| Holdout::new(axis, holdout.columns.as_ref().ok()?));
     let gains = match elsewhere {
         Some(rows) => {
             let [gains, in_judged_rows] = rows.gains(axis, &extended, watch)?;
             if shows(&in_judged_rows) && refuted(&in_judged_rows, &extended.effects) {
-                return Ok(found);
+                return Ok(None);
             }
             gains
         }
@@ -106,14 +126,12 @@ pub fn completed(
     let frame = &frame.believing(&base);
     let bench = Bench::new(frame, &Known::of(&extended, frame));
     let left = bench.fit(Vec::new());
-    let unexplained = unexplained(&bench, &left, &show::views(&bench, &left, &left), whole.table.is_some());
-    let Diagnosis { mut findings, mut notes, .. } = found;
-    notes.push(told.note);
-    findings.retain(|finding| !doubtful.contains(&finding.effect.cause()));
-    let rest = 1.0 - findings.iter().map(|finding| finding.share).sum::<f64>().min(1.0);
-    findings.push(Finding { share: rest * told.finding.share, ..told.finding });
-    findings.sort_by(|a, b| b.share.total_cmp(&a.share));
-    Ok(Diagnosis { verdict: told.verdict, findings, gains, unexplained, notes, extended, ..found })
+    let with_scale = recording.0.table_position.is_some();
+    let unexplained = unexplained(&bench, &left, &show::views(&bench, &left, &left), with_scale);
+    stays.notes.push(told.note);
+    stays.findings.push(told.finding);
+    stays.findings.sort_by(|a, b| b.share.total_cmp(&a.share));
+    Ok(Some(Diagnosis { verdict: told.verdict, gains, unexplained, extended, ..stays }))
 }
 
 /// Whether the loop has something to say.
@@ -267,30 +285,45 @@ mod tests {
     use crate::plant::simulate::{Sensors, Setup, simulate};
     use crate::recording::{Column, Recording};
 
-    /// What the loop adds to an answer that found nothing, of the rig of the demonstration with effects.
-    fn told(effects: &[Effect]) -> Vec<Effect> {
-        let belief = Machine::parse(include_str!("../../examples/machines/believed.json")).unwrap().axes.remove(0);
+    /// The rig of the demonstration.
+    pub(super) fn rig() -> Axis {
+        Machine::parse(include_str!("../../examples/machines/believed.json")).unwrap().axes.remove(0)
+    }
+
+    /// What a recorder sees of the rig with effects, behind an encoder of this grid.
+    pub(super) fn recorded(effects: &[Effect], grid_um: f64) -> Excerpt {
         let reach = Reach { start: 20.0, stroke: 200.0, speed: 250.0, acceleration: 2500.0 };
         let mut command = Moves::built_in("test", &reach).unwrap().command(1e-3);
         command.truncate(20_000);
-        let sensors = Sensors { grid_um: 0.05, torque_noise: 0.3, ..Sensors::default() };
-        let truth = belief.with_effects(effects.to_vec());
+        let sensors = Sensors { grid_um, torque_noise: 0.3, ..Sensors::default() };
+        let truth = rig().with_effects(effects.to_vec());
         let trace = simulate(&truth, &command, &Setup { seed: 1, sensors, ..Setup::default() }).unwrap();
         let columns = vec![
             Column::new("x.position_command_mm", trace.command),
             Column::new("x.position_mm", trace.position),
             Column::new("x.torque_nm", trace.torque),
         ];
-        let excerpt = Excerpt::of(&Recording::from_columns("simulated", trace.time_s, columns).unwrap(), &belief);
-        let whole = excerpt.columns.as_ref().unwrap();
-        let (base, thinned) = (belief::base_alone(&belief), whole.clone().thinned());
-        let frame = Frame::new(&base, &thinned, None);
-        let bench = Bench::new(&frame, &Known::of(&belief, &frame));
+        Excerpt::of(&Recording::from_columns("simulated", trace.time_s, columns).unwrap(), &rig())
+    }
+
+    /// An answer that has found these effects of the rig, before the loop is asked.
+    pub(super) fn found(effects: &[Effect], frame: &Frame, whole: &Columns) -> Diagnosis {
+        let extended = rig().with_effects(effects.to_vec());
+        let bench = Bench::new(frame, &Known::of(&extended, frame));
         let watch = Watch::new(&|_, _| true);
-        let believed = HeldOut::new([&belief, &belief], whole, &bench, &watch).believed();
-        let silent = Diagnosis {
-            verdict: Verdict::NoDiscrepancy,
-            findings: Vec::new(),
+        let errors = HeldOut::new([&extended, &extended], whole, &bench, &watch).believed();
+        let named = |&effect: &Effect| Finding {
+            effect,
+            deviations: vec![0.0; effect.values().len()],
+            confidence: 0.99,
+            share: 1.0 / effects.len() as f64,
+            evidence: String::new(),
+            indistinguishable_from: Vec::new(),
+            next_experiment: None,
+        };
+        Diagnosis {
+            verdict: if effects.is_empty() { Verdict::NoDiscrepancy } else { Verdict::Explained },
+            findings: effects.iter().map(named).collect(),
             gains: Vec::new(),
             unexplained: Unexplained {
                 torque: Left { rms: 0.0, noise_rms: 0.0, describes: String::new() },
@@ -299,11 +332,21 @@ mod tests {
             shown: Vec::new(),
             missing: Vec::new(),
             notes: Vec::new(),
-            extended: belief.clone(),
+            extended,
             followed: false,
-            replay: believed.unwrap().replay,
-        };
-        let answer = completed(&belief, (whole, None), &frame, silent, &watch).unwrap();
+            replay: errors.unwrap().replay,
+        }
+    }
+
+    /// What the loop adds to an answer that found nothing.
+    fn told(effects: &[Effect]) -> Vec<Effect> {
+        let excerpt = recorded(effects, 0.05);
+        let whole = excerpt.columns.as_ref().unwrap();
+        let (belief, thinned) = (rig(), whole.clone().thinned());
+        let base = belief::base_alone(&belief);
+        let frame = Frame::new(&base, &thinned, None);
+        let silent = found(&[], &frame, whole);
+        let answer = completed(&belief, (whole, None), &frame, silent, &Watch::new(&|_, _| true)).unwrap();
         answer.findings.iter().map(|finding| finding.effect).collect()
     }
 

@@ -178,6 +178,10 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
         frame = wide;
     }
     // What a quieter look has heard the first does not judge.
+    let sharpened = if by_first { by_loop::sharpened(axis, (whole, holdout), &first, &found, watch)? } else { None };
+    if let Some(sharper) = sharpened {
+        return watch.at(1.0, "done").map(|()| sharper);
+    }
     let found = if by_first { by_loop::settled(found, whole, &first, watch) } else { found };
     let found = by_loop::completed(axis, (whole, holdout), &first, found, watch)?;
     watch.at(1.0, "done").map(|()| found)

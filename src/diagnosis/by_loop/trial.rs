@@ -3,7 +3,7 @@
 use super::replays::{Over, Replays};
 use crate::diagnosis::belief;
 use crate::diagnosis::causes::presliding_friction::{BRISTLE, OF_ANY_EXPONENT};
-use crate::diagnosis::causes::table_side::swing_of;
+use crate::diagnosis::causes::table_side::{split, swing_of};
 use crate::diagnosis::causes::{Law, Resistance, Rest, Scale, law};
 use crate::diagnosis::fit::pseudo_inverse;
 use crate::diagnosis::frame::Frame;
@@ -27,6 +27,8 @@ const EVERY_SPRING: usize = 3;
 const TABLE: [f64; 3] = [0.25, 0.45, 0.65];
 const FRICTION: [f64; 3] = [0.35, 0.55, 0.75];
 const CONTACT_HZ: [f64; 2] = [500.0, 800.0];
+/// Numbers over those that were found, at which what was found is tried again.
+const AGAIN: [f64; 11] = [0.6, 0.7, 0.8, 0.9, 0.95, 1.0, 1.06, 1.12, 1.25, 1.45, 1.7];
 /// Damping ratio at which a spring is tried in place of flanks.
 const SPRING_DAMPING: f64 = 0.03;
 /// Steps of refining at most, and those after which it must be hopeful.
@@ -105,6 +107,41 @@ pub fn starts(frame: &Frame, law: &'static Law) -> Vec<Trial> {
 }
 
 impl Trial {
+    /// A clearance or a spring that was found; `None` of another cause.
+    #[must_use]
+    pub fn of(frame: &Frame, effect: &Effect) -> Option<Self> {
+        let law = law(effect.cause());
+        let shape = match law.cause {
+            Cause::Backlash => effect.values().into_iter().take(law.scales.len()).collect(),
+            Cause::DriveCompliance => swing_of(&split(frame, Some(*effect))?),
+            _ => return None,
+        };
+        Some(Self { law, shape, coefficients: vec![], open: false, linear: false })
+    }
+
+    /// The same in the valleys about it. The table of a clearance may be lighter or heavier, and slow down as fast, and its flanks be as far
+    /// apart as its impact then asks, and meet as hard as they do or as they mostly do. A spring may be stiffer or softer under the same
+    /// friction, or under as much more, or carry more or less.
+    #[must_use]
+    pub fn about(&self) -> Vec<Self> {
+        let ways = |by: f64| match (self.law.cause, self.shape.as_slice()) {
+            (Cause::Backlash, &[width, table, friction, own_hz]) => {
+                let contacts = [own_hz, CONTACT_HZ[0], CONTACT_HZ[1]];
+                contacts.map(|hz| vec![width / by, table * by, friction * by, hz]).into()
+            }
+            (_, &[own_hz, table, friction, damping]) => vec![
+                vec![own_hz * by, table, friction, damping],
+                vec![own_hz * by, table, friction * by * by, damping],
+                vec![own_hz, table * by, friction, damping],
+            ],
+            _ => Vec::new(),
+        };
+        let inside = |(scale, value): (&Scale, &f64)| (scale.moved(*value, 0.0) - value).abs() <= 1e-9 * value.abs();
+        let is_inside = |shape: &Vec<f64>| self.law.scales.iter().zip(shape).all(inside);
+        let with = |shape: Vec<f64>| Self { shape, ..self.clone() };
+        AGAIN.into_iter().flat_map(ways).filter(is_inside).map(with).collect()
+    }
+
     /// The effect that it stands for; `None` beyond physical bounds.
     #[must_use]
     pub fn effect(&self, frame: &Frame) -> Option<Effect> {
@@ -172,13 +209,14 @@ impl Trial {
         shapes.chain(self.open.then_some(Number::Coefficient)).collect()
     }
 
-    /// A small step of a number, in its own unit.
+    /// A small step of a number, in its own unit, and away from a bound that it has reached.
     fn small(&self, number: Number) -> f64 {
         match number {
-            Number::Shape(index) => match self.law.scales[index] {
-                Scale::Linear(_, _, unit) => STEPS_OF_LINEAR * unit,
-                _ => STEP_OF_LOG,
-            },
+            Number::Shape(index) => {
+                let (scale, value) = (self.law.scales[index], self.shape[index]);
+                let small = if let Scale::Linear(_, _, unit) = scale { STEPS_OF_LINEAR * unit } else { STEP_OF_LOG };
+                if scale.moved(value, small) == value { -small } else { small }
+            }
             Number::Coefficient => STEP_OF_COEFFICIENT * self.coefficients[0].abs().max(1e-12),
         }
     }
@@ -362,6 +400,18 @@ mod tests {
     use crate::diagnosis::belief::base_alone;
     use crate::diagnosis::frame::Columns;
     use crate::machine::Machine;
+
+    #[test]
+    fn a_clearance_is_tried_again_along_its_ridge_and_within_its_bounds() {
+        let shape = vec![10.0, 0.6, 0.5, 1200.0];
+        let found = Trial { law: law(Cause::Backlash), shape, coefficients: vec![], open: false, linear: false };
+        let tried = found.about();
+        assert!(tried.len() > 20 && tried.iter().any(|trial| trial.shape == found.shape));
+        for Trial { shape, .. } in &tried {
+            assert!((shape[0] * shape[1] - 6.0).abs() < 1e-9 && (shape[2] / shape[1] - 0.5 / 0.6).abs() < 1e-9);
+            assert!(shape[1] <= 0.9, "{shape:?}");
+        }
+    }
 
     #[test]
     fn soft_flanks_with_hardly_any_play_are_a_spring() {
