@@ -40,6 +40,19 @@ fn a_clearance_of_some_micrometres_is_found() {
     }
 }
 
+/// Behind a motor that is known to a quarter of a micrometre the torque has the flanks meet a row too soon or too late: by it alone these
+/// widths are 7 to 26 % off.
+#[test]
+fn a_clearance_that_the_torque_mistimes_is_as_wide_as_it_is() {
+    for (seed, encoder_step, width) in [(7, 2.5e-4, 12e-3), (8, 2.5e-4, 18e-3), (7, 5e-4, 12e-3), (8, 5e-4, 18e-3)] {
+        let rig = Rig { encoder_step, ..slow() };
+        let (verdict, findings) = said([&rig, &rig], seed, |truth| set_apart(truth, width, 600.0, [0.5, 0.55], 0.3));
+        println!("seed {seed}, encoder {encoder_step} mm: {width} mm, {verdict} {findings:?}");
+        let [(cause, um)] = findings.as_slice() else { panic!("{verdict}: {findings:?}") };
+        assert!(cause == "backlash" && (um * 1e-3 / width - 1.0).abs() < 0.03, "{cause} of {um} µm, not {width} mm");
+    }
+}
+
 #[test]
 fn friction_that_builds_up_over_some_micrometres_is_found() {
     let (verdict, findings) = said([&slow(), &slow()], 3, |truth| truth.presliding = 3e-3 / truth.unit);
