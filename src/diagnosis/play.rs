@@ -13,8 +13,10 @@ use super::select::{LEAST_GAIN, is_physical, price};
 use crate::machine::Cause;
 use std::sync::Arc;
 
-/// Times over which rows are summed, s, how far apart the points of a slope are, in steps of each scale, and most moves.
-const STAGES: [(f64, f64, usize); 3] = [(0.05, 12.0, 24), (0.02, 8.0, 6), (0.006, 4.0, 6)];
+/// Times over which rows are summed, s, and how far apart the points of a slope are, in steps of each scale.
+const STAGES: [(f64, f64); 3] = [(0.05, 12.0), (0.02, 8.0), (0.006, 4.0)];
+/// Most moves in a stage.
+const MOVES: usize = 6;
 /// Masses of the table that are carried on.
 const CARRIED_ON: usize = 2;
 /// Most steps of a fit by itself, with all the others, and further ones of the best: its numbers lean on each other.
@@ -100,8 +102,8 @@ fn in_its_place(bench: &Bench, found: &Fit, set: &Fit, watch: &Watch) -> Result<
             return Ok(None);
         }
     }
-    let [first, finer @ ..] = STAGES.map(|(seconds, steps, moves)| (bench.smoothed(seconds), (steps, moves)));
-    let approached = |(sums, going): &(Bench, _), shapes| approached(sums, *going, &beside, shapes, &resistance);
+    let [first, finer @ ..] = STAGES.map(|(seconds, steps)| (bench.smoothed(seconds), steps));
+    let approached = |(sums, steps): &(Bench, f64), shapes| approached(sums, *steps, &beside, shapes, &resistance);
     let Some((left, there)) = approached(&first, loose_spring::starts(bench.frame, &masses)) else {
         return Ok(None);
     };
@@ -124,7 +126,7 @@ fn in_its_place(bench: &Bench, found: &Fit, set: &Fit, watch: &Watch) -> Result<
 /// Squares that are left, and where the best of some starts leads on sums.
 fn approached(
     sums: &Bench,
-    (steps, moves): (f64, usize),
+    steps: f64,
     beside: &Fit,
     shapes: Vec<Vec<f64>>,
     resistance: &Arc<Resistance>,
@@ -137,6 +139,6 @@ fn approached(
     let parts = sums.parts_under(&loose_spring::LAW, shapes, resistance).into_iter();
     let rated = parts.map(|part| (squares(&part), part)).filter(|(squares, _)| squares.is_finite());
     let (_, nearest) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let part = sums.approached(&there, nearest, steps, moves);
+    let part = sums.approached(&there, nearest, steps, MOVES);
     Some((squares(&part), part.shape))
 }
