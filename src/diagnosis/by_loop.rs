@@ -36,7 +36,7 @@ use crate::machine::{Axis, Cause, Effect};
 use crate::plant::added::ByServo;
 use crate::plant::observed::Observed;
 use itself::Itself;
-use replays::{NOTHING, Replays};
+use replays::{NOTHING, Replays, avoidable};
 use trial::{Refined, Trial, starts};
 
 /// Misses from which on the loop has something to say: half of the blocks are missed, in the geometric mean, by more than twice what the
@@ -159,7 +159,7 @@ fn told(
 ) -> Result<Option<Told>, Stopped> {
     let Some((before, unavoidable)) = replays.error_and_unavoidable(named) else { return Ok(None) };
     let misses = replays.misses(&before);
-    let avoidable: Vec<f64> = misses.iter().zip(&unavoidable).map(|(miss, by)| miss - by.max(NOTHING)).collect();
+    let avoidable = avoidable(&misses, &unavoidable);
     if !is_much(&misses) || !is_much(&avoidable.iter().map(|miss| miss + NOTHING).collect::<Vec<_>>()) {
         return Ok(None);
     }
@@ -168,7 +168,7 @@ fn told(
     let hopeful = mean(&misses, GIVES) - HOPE * enough(GIVES);
     let refine = |trial: Trial| {
         let refined = trial.refined(frame, extended, replays, GIVES, hopeful)?;
-        let gained: Vec<f64> = misses.iter().zip(replays.misses(&refined.error)).map(|(b, a)| b - a).collect();
+        let gained = replays.gained(&misses, &refined.error);
         Some((mean(&gained, JUDGES), gained, refined))
     };
     let refined = watch.each(&best, (0.99, 0.995), STAGE, |trial| refine(trial.clone()))?;
@@ -207,10 +207,9 @@ fn told(
         next_experiment: alike.first().map(|other| experiment::telling(frame, cause, *other)),
         indistinguishable_from: alike,
     };
-    let [missed, left] = [&before, &whole.error].map(|error| 1e3 * replays.typically(&replays.misses(error)));
-    let unit = if frame.axis.drive.is_rotary() { "thousandths of a degree" } else { "µm" };
+    let [missed, left] = [&before, &whole.error].map(|error| replays.says(error, frame.axis));
     let note = format!(
-        "{} is told by the closed loop, not by the torque: replayed without it the loop typically misses the measured position by {missed:.3} {unit}, with it by {left:.3} {unit}",
+        "{} is told by the closed loop, not by the torque: replayed without it the loop typically misses the measured position by {missed}, with it by {left}",
         cause.name()
     );
     Ok(Some(Told { verdict, finding, note, by_half }))

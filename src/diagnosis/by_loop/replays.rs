@@ -156,10 +156,18 @@ impl<'r> Replays<'r> {
         self.blocks().into_iter().map(miss).collect()
     }
 
-    /// The typical error of such misses, load units: the geometric mean of blocks, above what the encoder itself is off by.
+    /// By how much less each block is missed by an error.
     #[must_use]
-    pub fn typically(&self, misses: &[f64]) -> f64 {
-        self.floor * (2.0 * mean(misses, Over::All)).exp_m1().sqrt()
+    pub fn gained(&self, misses: &[f64], error: &[f64]) -> Vec<f64> {
+        misses.iter().zip(self.misses(error)).map(|(before, after)| before - after).collect()
+    }
+
+    /// What is said of an error: the geometric mean of blocks, above what the encoder itself is off by.
+    #[must_use]
+    pub fn says(&self, error: &[f64], axis: &Axis) -> String {
+        let typical = 1e3 * self.floor * (2.0 * mean(&self.misses(error), Over::All)).exp_m1().sqrt();
+        let unit = if axis.drive.is_rotary() { "thousandths of a degree" } else { "µm" };
+        format!("{typical:.3} {unit}")
     }
 
     /// The weight by which the squares of each block count, so that all count alike.
@@ -178,6 +186,12 @@ impl<'r> Replays<'r> {
         }
         lies
     }
+}
+
+/// Misses beyond those that are unavoidable, a block each.
+#[must_use]
+pub fn avoidable(misses: &[f64], unavoidable: &[f64]) -> Vec<f64> {
+    misses.iter().zip(unavoidable).map(|(miss, by)| miss - by.max(NOTHING)).collect()
 }
 
 /// Mean over some blocks.

@@ -5,10 +5,11 @@
 //! follow the encoder. It has valleys as well: the table of a clearance slows down by its friction over its inertia, which are known well
 //! together, and its impact goes as width times inertia. The loop is asked in each about the numbers that were found.
 
-use super::replays::{NOTHING, Over, Replays, mean, mean_of_worse_half, misses, strength};
+use super::replays::{NOTHING, Over, Replays, avoidable, mean, mean_of_worse_half, misses, strength};
 use super::trial::{Refined, Trial};
 use super::{ABOUT_REVERSALS, GIVES, JUDGES, STAGE, Told, answered, by_torque};
 use crate::analysis::statistics;
+use crate::diagnosis::causes::law;
 use crate::diagnosis::excerpt::Excerpt;
 use crate::diagnosis::frame::{Columns, Frame};
 use crate::diagnosis::gain;
@@ -16,19 +17,17 @@ use crate::diagnosis::judge::refuted;
 use crate::diagnosis::progress::{Stopped, Watch};
 use crate::diagnosis::verdict::{Diagnosis, Verdict};
 use crate::diagnosis::{belief, verdict::Finding};
-use crate::machine::{Axis, Cause, Effect};
+use crate::machine::{Axis, Effect};
 use crate::plant::added::ByServo;
 use crate::plant::observed::Observed;
 
-/// What parts table and motor.
-const PART_TABLE: [Cause; 2] = [Cause::Backlash, Cause::DriveCompliance];
 /// Misses of the worse half of the blocks from which on the loop is asked: there the error is that of the encoder.
 const ASKED: f64 = NOTHING;
 /// Mean over scatter of what the loop's numbers gain in blocks that did not give them, times √blocks, from which on they are taken: either
 /// are of the same cause, and the torque's are no more certain.
 const LIKELY: f64 = 1.0;
 /// Misses beyond what such an encoder makes the loop miss of the very machine, in the worse half of the blocks, from which on there is
-/// something to win: of eight machines as they are it was −0.11 to 0.03, of eleven with numbers that were off 0.04 to 1.23.
+/// something to win: of nine machines as they are it was −0.11 to 0.03, of twelve with numbers that were off 0.04 to 1.23.
 const AVOIDABLE: f64 = 0.06;
 /// Valleys that are gone into.
 const VALLEYS: usize = 2;
@@ -37,8 +36,8 @@ const SHALLOW: f64 = 0.005;
 /// How often valleys are looked for anew about the best.
 const ROUNDS: usize = 4;
 
-/// An answer whose clearance or spring has the numbers that the loop gives it, where those surely repeat the measured position better and the
-/// torque does not gainsay them; `None` where it stays as it is. `frame` is what the torque is judged on.
+/// An answer whose clearance or spring has the numbers that the loop gives it, where those repeat the measured position better and neither torque nor
+/// table gainsays them; `None` where it stays as it is. `frame` is what the torque is judged on.
 ///
 /// # Errors
 /// [`Stopped`] when the watch's caller said so.
@@ -52,7 +51,7 @@ pub fn sharpened(
     // What is believed is not found again, and a spring with play is two.
     let believed = axis.effects.iter().any(|effect| ABOUT_REVERSALS.contains(&effect.cause()));
     let named = matches!(found.verdict, Verdict::Explained | Verdict::PartlyExplained);
-    let parts_table = |finding: &&Finding| PART_TABLE.contains(&finding.effect.cause());
+    let parts_table = |finding: &&Finding| law(finding.effect.cause()).is_simulated();
     let parting: Vec<&Finding> = found.findings.iter().filter(parts_table).collect();
     let ([parting], Some(known), true) = (parting.as_slice(), &found.replay, named && !believed) else {
         return Ok(None);
@@ -77,7 +76,7 @@ pub fn sharpened(
     answered(axis, ((&observed, &servo), holdout), frame, (&replays, &without), (stays, told), watch)
 }
 
-/// The same with the loop's numbers beside the second machine, where they are surely better than those that the first has.
+/// The same with the loop's numbers beside the second machine, where they are better than those that the first has.
 fn told(
     replays: &Replays,
     (frame, whole, recording): (&Frame, &Columns, (&Observed, &ByServo)),
@@ -88,13 +87,13 @@ fn told(
     let Some(start) = Trial::of(frame, &found.effect) else { return Ok(None) };
     let Some((before, unavoidable)) = replays.error_and_unavoidable(named) else { return Ok(None) };
     let misses = replays.misses(&before);
-    let avoidable: Vec<f64> = misses.iter().zip(&unavoidable).map(|(miss, by)| miss - by.max(NOTHING)).collect();
+    let avoidable = avoidable(&misses, &unavoidable);
     if mean_of_worse_half(&avoidable, Over::All) < AVOIDABLE {
         return Ok(None);
     }
     let deepest = in_the_deepest_valley(start, frame, without, replays, watch)?;
     let Some((half, alike)) = deepest else { return Ok(None) };
-    let gained: Vec<f64> = misses.iter().zip(replays.misses(&half.error)).map(|(b, a)| b - a).collect();
+    let gained = replays.gained(&misses, &half.error);
     let better = mean(&gained, JUDGES) > 0.0 && strength(&gained, &misses, JUDGES) > LIKELY;
     let by_half = half.trial.on(frame, without).filter(|_| better && !half.trial.is_stopped());
     let Some(by_half) = by_half else { return Ok(None) };
@@ -109,10 +108,9 @@ fn told(
     };
     let Some((effect, own)) = all.effect(frame, without) else { return Ok(None) };
     let deviations = half.trial.effect(frame).map_or(own.clone(), |deepest| widened(own, &deepest, &alike));
-    let [missed, left] = [&before, &all.error].map(|error| 1e3 * replays.typically(&replays.misses(error)));
-    let unit = if frame.axis.drive.is_rotary() { "thousandths of a degree" } else { "µm" };
+    let [missed, left] = [&before, &all.error].map(|error| replays.says(error, frame.axis));
     let note = format!(
-        "the numbers of the {} are the closed loop's: replayed with those that the torque gives it typically misses the measured position by {missed:.3} {unit}, with these by {left:.3} {unit}",
+        "the numbers of the {} are the closed loop's: replayed with those that the torque gives it typically misses the measured position by {missed}, with these by {left}",
         effect.cause().name()
     );
     let finding = Finding { effect, deviations, ..found.clone() };
