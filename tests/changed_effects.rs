@@ -84,6 +84,36 @@ fn what_has_changed_takes_the_place_of_what_is_believed_of_it() {
     }
 }
 
+/// A spring and its play are simulated as one, and are found again as one where either has changed. The table is light: twice as heavy a
+/// one on a stiffer spring, with more of the friction, loses as much at a reversal.
+#[test]
+fn a_spring_with_play_that_has_changed_takes_the_place_of_the_believed_one() {
+    let play = |width_um| Effect::from_values(Cause::Backlash, &[width_um]).unwrap();
+    let spring = |resonance_hz, stiffness_n_um| Effect::DriveCompliance {
+        resonance_hz,
+        stiffness_n_um,
+        table_inertia_share: 0.2,
+        table_friction_share: 0.5,
+        damping_ratio: 0.05,
+    };
+    let believed = rig(&[play(20.0), spring(75.0, 40.0)]);
+    for (seed, width, resonance_hz, stiffness, scale) in [(12, 26.0, 75.0, 40.0, true), (13, 20.0, 65.0, 30.0, false)] {
+        let truth = rig(&[play(width), spring(resonance_hz, stiffness)]);
+        let d = judged(&believed, &recorded_by(&truth, &test_moves(), seed, good(0.03), scale));
+        println!("{width} {resonance_hz}: {:?} {:?}", d.verdict, d.extended.effects);
+        assert_eq!(d.extended.effects.len(), 2, "{:?} {:?}", d.verdict, d.extended.effects);
+        for effect in &d.extended.effects {
+            let (found, right) = match *effect {
+                Effect::Backlash { width_um, .. } => (width_um, width),
+                Effect::DriveCompliance { stiffness_n_um, .. } => (stiffness_n_um, stiffness),
+                _ => panic!("{effect:?}"),
+            };
+            assert!((found / right - 1.0).abs() < 0.05, "{effect:?}, not {right}");
+        }
+        assert!(matches!(d.verdict, Verdict::Explained | Verdict::PartlyExplained), "{:?}", d.verdict);
+    }
+}
+
 /// What a ripple of the belief leaves is no ripple beside it: two of one period have no phases of their own.
 #[test]
 fn a_ripple_of_another_size_takes_the_place_of_the_believed_one() {

@@ -13,12 +13,11 @@ use super::select::{LEAST_GAIN, is_physical, price};
 use crate::machine::Cause;
 use std::sync::Arc;
 
-/// Times over which rows are summed, s, and how far apart the points of a slope are, in steps of each scale.
-const STAGES: [(f64, f64); 3] = [(0.05, 12.0), (0.02, 8.0), (0.006, 4.0)];
-/// Most moves in a stage.
-const MOVES: usize = 6;
-/// Masses of the table that are carried on.
-const CARRIED_ON: usize = 2;
+/// Times over which rows are summed, s, how far apart the points of a slope are, in steps of each scale, and most moves: few where many
+/// are under way.
+const STAGES: [(f64, f64, usize); 3] = [(0.05, 12.0, 6), (0.02, 8.0, 3), (0.006, 4.0, 6)];
+/// Swings of the table that are carried on from each of the finer stages.
+const CARRIED_ON: [usize; 2] = [5, 2];
 /// Most steps of a fit by itself, with all the others, and further ones of the best: its numbers lean on each other.
 const STEPS: [usize; 3] = [6, 4, 16];
 /// Frequency of contact, Hz, below which flanks that leave little may be a spring with play: hard ones are found at twice that and more.
@@ -102,21 +101,24 @@ fn in_its_place(bench: &Bench, found: &Fit, set: &Fit, watch: &Watch) -> Result<
             return Ok(None);
         }
     }
-    let [first, finer @ ..] = STAGES.map(|(seconds, steps)| (bench.smoothed(seconds), steps));
-    let approached = |(sums, steps): &(Bench, f64), shapes| approached(sums, *steps, &beside, shapes, &resistance);
-    let Some((left, there)) = approached(&first, loose_spring::starts(bench.frame, &masses)) else {
-        return Ok(None);
-    };
+    let [first, finer @ ..] = STAGES.map(|(seconds, steps, moves)| (bench.smoothed(seconds), (steps, moves)));
+    let approached =
+        |(sums, moves): &(Bench, _), law, shapes| approached((sums, *moves), &beside, (law, shapes), &resistance);
+    let starts = loose_spring::starts(bench.frame, &masses);
+    let lost =
+        watch.each(&starts, (0.9, 0.9), STAGE, |shapes| approached(&first, &loose_spring::LOST, shapes.clone()))?;
+    let Some((left, lost)) = lost.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0)) else { return Ok(None) };
     if in_doubt && left > LESS * first.0.again(found).squares() {
         return Ok(None);
     }
-    let there = watch.each(&loose_spring::of_any_mass(&there), (0.9, 0.9), STAGE, |shape| {
-        finer.iter().try_fold((0.0, shape.clone()), |(_, shape), stage| approached(stage, vec![shape]))
-    })?;
-    let mut there: Vec<(f64, Vec<f64>)> = there.into_iter().flatten().collect();
-    there.sort_by(|a, b| a.0.total_cmp(&b.0));
-    there.truncate(CARRIED_ON);
-    let fits = watch.each(&there, (0.9, 0.9), STAGE, |(_, shape)| {
+    let mut there = loose_spring::losing(bench.frame, &lost);
+    for (stage, carried_on) in finer.iter().zip(CARRIED_ON) {
+        let moved = |shape: &Vec<f64>| approached(stage, &loose_spring::LAW, vec![shape.clone()]);
+        let mut nearer: Vec<_> = watch.each(&there, (0.9, 0.9), STAGE, moved)?.into_iter().flatten().collect();
+        nearer.sort_by(|a, b| a.0.total_cmp(&b.0));
+        there = nearer.into_iter().take(carried_on).map(|(_, shape)| shape).collect();
+    }
+    let fits = watch.each(&there, (0.9, 0.9), STAGE, |shape| {
         let start = with(bench.parts_under(&loose_spring::LAW, vec![shape.clone()], &resistance).swap_remove(0));
         bench.refine(bench.refine_roughly(start, others.len(), STEPS[0]), 0, STEPS[1])
     })?;
@@ -125,10 +127,9 @@ fn in_its_place(bench: &Bench, found: &Fit, set: &Fit, watch: &Watch) -> Result<
 
 /// Squares that are left, and where the best of some starts leads on sums.
 fn approached(
-    sums: &Bench,
-    steps: f64,
+    (sums, (steps, most)): (&Bench, (f64, usize)),
     beside: &Fit,
-    shapes: Vec<Vec<f64>>,
+    (law, shapes): (&'static Law, Vec<Vec<f64>>),
     resistance: &Arc<Resistance>,
 ) -> Option<(f64, Vec<f64>)> {
     let there = sums.again(beside);
@@ -136,9 +137,9 @@ fn approached(
         let left = sums.left_beside(&there, part);
         dot(&left, &left)
     };
-    let parts = sums.parts_under(&loose_spring::LAW, shapes, resistance).into_iter();
+    let parts = sums.parts_under(law, shapes, resistance).into_iter();
     let rated = parts.map(|part| (squares(&part), part)).filter(|(squares, _)| squares.is_finite());
     let (_, nearest) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let part = sums.approached(&there, nearest, steps, MOVES);
+    let part = sums.approached(&there, nearest, steps, most);
     Some((squares(&part), part.shape))
 }

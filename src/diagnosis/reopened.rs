@@ -3,7 +3,7 @@
 //! The effect is then looked for as if nothing were known of it, and what is found takes its place.
 
 use super::belief;
-use super::causes::position_dependent_friction;
+use super::causes::{Law, law, loose_spring, position_dependent_friction};
 use super::fit::{Bench, Fit};
 use super::frame::Frame;
 use super::judge::{TOLERABLE_EXCESS, rms};
@@ -42,26 +42,56 @@ pub fn without_misjudged(
         |left: &Left| Some(excess(left.rms, left.noise_rms)).filter(|all| *all > least * left.noise_rms.powi(2));
     let all = unexplained.map(|left| left.and_then(above));
     let mut best: (f64, Option<Axis>) = (1.0, None);
-    for (i, effect) in axis.effects.iter().enumerate().filter(|_| all.iter().any(Option::is_some)) {
-        let Some((law, shape)) = numbers(axis, frame, effect).filter(|_| is_by_itself(axis, effect)) else { continue };
-        let mut others = axis.effects.clone();
-        others.remove(i);
-        let without = axis.with_effects(others);
+    let suspects = if all.iter().any(Option::is_some) { suspects(axis, frame) } else { Vec::new() };
+    for Suspect { without, believed: (law, shape), laws, most_left } in suspects {
         let other = Bench::new(frame, &Known::of(&without, frame));
         let near = other.refine_roughly(other.fit(other.parts(law, vec![shape])), 0, STEPS);
-        let far = Search::new(&other, &[law], watch)?.from_belief()?.fit;
+        let far = Search::new(&other, &laws, watch)?.from_belief()?.fit;
         let share_left = |fit: &Fit| {
             let above = |(c, rest): (usize, &Vec<f64>)| Some(excess(rms(rest), frame.floor(rest, c == 0)) / all[c]?);
             other.rest(fit).iter().enumerate().filter_map(above).fold(f64::INFINITY, f64::min).sqrt()
         };
         let physical = [near, far].into_iter().filter(|fit| is_physical(&other, fit));
         let left = physical.map(|fit| share_left(&fit)).fold(f64::INFINITY, f64::min);
-        let most_left = if has_phase(effect) { MOST_LEFT_OF_RIPPLE } else { MOST_LEFT };
         if left < most_left.min(best.0) {
             best = (left, Some(without));
         }
     }
     Ok(best.1)
+}
+
+/// What of a belief may be there with other numbers.
+struct Suspect {
+    /// The axis without it.
+    without: Axis,
+    /// Its law, with the believed numbers.
+    believed: (&'static Law, Vec<f64>),
+    /// By what it would be found.
+    laws: Vec<&'static Law>,
+    /// What other numbers must come down to, as a share in amplitude.
+    most_left: f64,
+}
+
+/// Each effect by itself, but a spring and its play together: those are simulated as one.
+fn suspects(axis: &Axis, frame: &Frame) -> Vec<Suspect> {
+    const OF_ONE: [Cause; 2] = [Cause::Backlash, Cause::DriveCompliance];
+    let is_of_one = |effect: &Effect| OF_ONE.contains(&effect.cause());
+    let loose_spring = || {
+        let without = axis.with_effects(axis.effects.iter().copied().filter(|effect| !is_of_one(effect)).collect());
+        let shape = loose_spring::shape_of(frame, &axis.two_masses().ok()??);
+        let laws = OF_ONE.map(law).into();
+        Some(Suspect { without, believed: (&loose_spring::LAW, shape), laws, most_left: MOST_LEFT })
+    };
+    let both = axis.effects.iter().filter(|effect| is_of_one(effect)).count() == OF_ONE.len();
+    let by_itself = |(i, effect): (usize, &Effect)| {
+        let believed = numbers(axis, frame, effect).filter(|_| is_by_itself(axis, effect))?;
+        let mut others = axis.effects.clone();
+        others.remove(i);
+        let most_left = if has_phase(effect) { MOST_LEFT_OF_RIPPLE } else { MOST_LEFT };
+        Some(Suspect { without: axis.with_effects(others), laws: vec![believed.0], believed, most_left })
+    };
+    let alone = axis.effects.iter().enumerate().filter(|(_, effect)| !(both && is_of_one(effect)));
+    alone.filter_map(by_itself).chain(both.then(loose_spring).flatten()).collect()
 }
 
 /// Whether an effect is not found beside what is believed of it: there is one of it, or two side by side imitate anything, as two

@@ -35,8 +35,8 @@ pub(super) const DAMPING: f64 = 0.03;
 const DAMPING_BY_MEANS: f64 = 0.1;
 
 /// How the table's own frequency and its share of the friction over that of the inertia are searched.
-const OWN_HZ: Scale = Scale::Log(2.0, FASTEST_HZ);
-const RUBBING: Scale = Scale::Log(0.02, 25.0);
+pub(super) const OWN_HZ: Scale = Scale::Log(2.0, FASTEST_HZ);
+pub(super) const RUBBING: Scale = Scale::Log(0.02, 25.0);
 
 /// Parameters: the table's own frequency in Hz, share of the inertia on the table's side, share of the friction there over that,
 /// damping ratio of the table's own swing.

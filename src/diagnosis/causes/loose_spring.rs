@@ -3,7 +3,7 @@
 //!
 //! What is simulated is one thing, and what is said of it are two.
 
-use super::drive_compliance::{self, DAMPING, MOST_DAMPING, swinging};
+use super::drive_compliance::{self, DAMPING, MOST_DAMPING, OWN_HZ, RUBBING, swinging};
 use super::*;
 use crate::diagnosis::fit::{Fit, Part};
 use crate::machine::TwoMasses;
@@ -20,69 +20,111 @@ const FASTEST_HZ: f64 = 300.0;
 const LITTLE_PLAY: f64 = 0.04;
 /// Most frequencies that are begun with.
 const MOST_STARTS: f64 = 30.0;
-/// Share of the inertia on the table's side at a start, and those that are tried once the others are about right.
+/// Share of the inertia on the table's side at a start.
 const SHARE: f64 = 0.4;
-const SHARES: [f64; 4] = [0.15, 0.3, 0.5, 0.75];
+/// How much faster the table swings at further starts, how much more is wound up at others, and the most of the friction that the table
+/// carries.
+const SWINGS: [f64; 4] = [0.6, 1.0, 1.4, 2.1];
+const WOUND_UP: [f64; 4] = [0.4, 2.5, 6.0, 15.0];
+const MOST_CARRIED: f64 = 0.9;
 
-/// Full width in µm; frequency of half of the inertia on the spring, Hz, which is its stiffness; shares of inertia and friction on the
-/// table's side, damping ratio of the table's own swing. How far the drive winds up tells stiffness and friction whatever the table's
-/// mass.
-const SCALES: &[Scale] = &[
-    Scale::Log(0.1, 2000.0),
-    Scale::Log(2.0, FASTEST_HZ),
-    Scale::Linear(0.04, 0.95, 0.01),
-    Scale::Linear(0.02, 1.0, 0.01),
-    Scale::Log(2e-3, MOST_DAMPING),
-];
+const WIDTH_UM: Scale = Scale::Log(0.1, 2000.0);
+const TABLE: Scale = Scale::Linear(0.04, 0.95, 0.01);
+const DAMPED: Scale = Scale::Log(2e-3, MOST_DAMPING);
 
-/// The spring in the numbers of the law of one without play.
-fn spring(shape: &[f64]) -> Option<[f64; 4]> {
-    let &[_, half_hz, share, friction_share, damping] = shape else { return None };
-    Some([half_hz * (0.5 / share).sqrt(), share, friction_share / share, damping])
-}
-
-/// The two as they are simulated: a clearance whose flanks meet as softly as the spring is.
-pub static LAW: Law = of_both(Cause::Backlash, |frame, shape, _| {
-    let &[width_um, half_hz, ..] = shape else { return None };
+/// The two as they are simulated: a clearance whose flanks meet as softly as the spring is. Full width in µm, and the spring in the numbers
+/// of its own law: the table moves by its own frequency and by its friction over its mass, and what the motor feels of that goes with
+/// its mass.
+pub static LAW: Law = of_both(SCALES, Cause::Backlash, both, |frame, shape, _| {
     // Within three steps of the encoder a turn is no crossing.
-    let crosses = width_um > 3e3 * frame.grid && half_hz < 0.95 * FASTEST_HZ;
-    both(frame, shape)
-        .filter(|_| crosses && spring(shape).is_some_and(|spring| swinging(frame, &spring, &[]).is_some()))
+    let crosses = *shape.first()? > 3e3 * frame.grid && half_hz(shape) < 0.95 * FASTEST_HZ;
+    both(frame, shape).filter(|_| crosses && swinging(frame, &shape[1..], &[]).is_some())
 });
+
+const SCALES: &[Scale] = &[WIDTH_UM, OWN_HZ, TABLE, RUBBING, DAMPED];
+
+/// The same for sums over many swings, which tell how much is lost at a reversal: that in µm, the share of the play in it, shares of
+/// inertia and friction on the table's side, damping ratio of the table's own swing.
+pub static LOST: Law = of_both(
+    &[WIDTH_UM, Scale::Linear(0.02, 0.995, 0.01), TABLE, Scale::Linear(0.02, 1.0, 0.01), DAMPED],
+    Cause::Backlash,
+    |frame, lost| both(frame, &swinging_at(frame, lost, 1.0)?),
+    |_, _, _| None,
+);
 
 /// The clearance and the spring as they are said.
 pub static SAID: [Law; 2] = [
-    of_both(Cause::Backlash, |_, shape, _| Effect::from_values(Cause::Backlash, shape.get(..1)?)),
-    of_both(Cause::DriveCompliance, |frame, shape, _| swinging(frame, &spring(shape)?, &[])),
+    of_both(SCALES, Cause::Backlash, both, |_, shape, _| Effect::from_values(Cause::Backlash, shape.get(..1)?)),
+    of_both(SCALES, Cause::DriveCompliance, both, |frame, shape, _| swinging(frame, shape.get(1..)?, &[])),
 ];
 
-const fn of_both(cause: Cause, effect: fn(&Frame, &[f64], &[f64]) -> Option<Effect>) -> Law {
+type Simulated = fn(&Frame, &[f64]) -> Option<Effect>;
+
+const fn of_both(
+    scales: &'static [Scale],
+    cause: Cause,
+    simulated: Simulated,
+    effect: fn(&Frame, &[f64], &[f64]) -> Option<Effect>,
+) -> Law {
     Law {
         cause,
-        scales: SCALES,
+        scales,
         starts: |_, _| Vec::new(),
         manner: PLAIN,
-        terms: Terms::Simulated(both),
+        terms: Terms::Simulated(simulated),
         effect,
         confused_with: &[Cause::PreslidingFriction],
         sentence: |_, _| String::new(),
     }
 }
 
+/// The frequency of half of the inertia on the spring, Hz.
+fn half_hz(shape: &[f64]) -> f64 {
+    shape[1] * (shape[2] / 0.5).sqrt()
+}
+
 /// What stands between motor and table.
 fn both(frame: &Frame, shape: &[f64]) -> Option<Effect> {
-    let &[width_um, _, table_inertia_share, table_friction_share, _] = shape else { return None };
-    let Effect::DriveCompliance { resonance_hz, damping_ratio, .. } = drive_compliance::effect(frame, &spring(shape)?)?
+    let Effect::DriveCompliance { resonance_hz, table_inertia_share, table_friction_share, damping_ratio, .. } =
+        drive_compliance::effect(frame, shape.get(1..)?)?
     else {
         return None;
     };
     Some(Effect::Backlash {
-        width_um,
+        width_um: *shape.first()?,
         table_inertia_share,
         table_friction_share,
         contact_hz: resonance_hz,
         contact_damping_ratio: damping_ratio,
     })
+}
+
+/// What is lost as the table's law has it, of a table that swings faster by its friction over its mass: as much is wound up.
+fn swinging_at(frame: &Frame, lost: &[f64], faster: f64) -> Option<Vec<f64>> {
+    let &[lost_um, play, share, friction_share, damping] = lost else { return None };
+    let wound_up = lost_um * (1.0 - play) * frame.axis.drive.motor_per_um();
+    let own = (2.0 * friction_share * frame.belief.coulomb / wound_up / (share * frame.belief.inertia)).sqrt();
+    let rubbing = friction_share / share * faster * faster;
+    let share = share.min(MOST_CARRIED / rubbing);
+    (own > 0.0 && own.is_finite()).then(|| vec![lost_um * play, own / TAU * faster, share, rubbing, damping])
+}
+
+/// What is lost as much, in the numbers of the table's law: behind tables that swing otherwise, of which more or less is wound up, and
+/// whose swing lasts. A table that bounces goes another way after each impact, one that is damped does not.
+#[must_use]
+pub fn losing(frame: &Frame, lost: &[f64]) -> Vec<Vec<f64>> {
+    let by_swing = SWINGS.into_iter().map(|faster| (lost.to_vec(), faster));
+    let with_play = |more: f64| {
+        let mut lost = lost.to_vec();
+        lost[1] = 1.0 - (1.0 - lost[1]) * more;
+        (lost, 1.0)
+    };
+    let by_play = WOUND_UP.into_iter().map(with_play).filter(|(lost, _)| lost[1] > LITTLE_PLAY);
+    let there = by_swing.chain(by_play).filter_map(|(lost, faster)| swinging_at(frame, &lost, faster));
+    let soft = there.filter(|shape| half_hz(shape) < FASTEST_HZ);
+    let damped =
+        |shape: Vec<f64>| [DAMPING, shape[4]].map(|damping| shape[..4].iter().copied().chain([damping]).collect());
+    soft.flat_map(damped).collect()
 }
 
 /// Whether a part is the two together.
@@ -116,28 +158,38 @@ fn lost(frame: &Frame, masses: &TwoMasses) -> f64 {
     masses.clearance + 2.0 * masses.table_friction_share * frame.belief.coulomb / masses.stiffness
 }
 
-/// Starts by what was found of one of the two, with a table of no particular mass. The stiffer the spring the more of what is lost is
-/// play.
+/// The two in the numbers of their law.
 #[must_use]
-pub fn starts(frame: &Frame, found: &TwoMasses) -> Vec<Vec<f64>> {
-    let half = 0.5 * frame.belief.inertia;
-    let (friction, lost) = (found.table_friction_share * frame.belief.coulomb, lost(frame, found));
-    let by_spring_alone = (2.0 * friction / lost / half).sqrt() / TAU;
+pub fn shape_of(frame: &Frame, masses: &TwoMasses) -> Vec<f64> {
+    let width_um = masses.clearance / frame.axis.drive.motor_per_um();
+    std::iter::once(width_um).chain(table_side::swing_of(masses)).collect()
+}
+
+/// Starts of [`LOST`] by what was found of one of the two, in groups: that itself, and with its table or one of no particular mass
+/// the stiffer springs the more of what is lost is play.
+#[must_use]
+pub fn starts(frame: &Frame, found: &TwoMasses) -> [Vec<Vec<f64>>; 3] {
+    let (lost, friction) = (lost(frame, found), found.table_friction_share);
+    let lost_um = lost / frame.axis.drive.motor_per_um();
+    let by_spring_alone = (4.0 * friction * frame.belief.coulomb / lost / frame.belief.inertia).sqrt() / TAU;
     let count = ((FASTEST_HZ / by_spring_alone).ln() / STEP.ln()).clamp(1.0, MOST_STARTS) as i32;
-    let with = |step: i32, loses: f64| {
-        let faster = FIRST * STEP.powi(step);
-        let width = loses * lost * (1.0 - faster.powi(-2));
-        let width_um = width / frame.axis.drive.motor_per_um();
-        vec![width_um, by_spring_alone * faster / loses.sqrt(), SHARE, found.table_friction_share, DAMPING]
+    let of_table = |share: f64| {
+        let with = |step: i32, loses: f64| {
+            let play = 1.0 - (FIRST * STEP.powi(step)).powi(-2);
+            vec![loses * lost_um, play, share, friction, DAMPING]
+        };
+        (0..count).flat_map(|step| LOSES.map(|loses| with(step, loses))).collect()
     };
-    (0..count).flat_map(|step| LOSES.map(|loses| with(step, loses))).collect()
+    let &[_, share, _, damping] = table_side::swing_of(found).as_slice() else { return Default::default() };
+    let itself = vec![lost_um, found.clearance / lost, share, friction, damping];
+    [vec![itself], of_table(share), of_table(SHARE)]
 }
 
 /// A clearance as wide, whose flanks meet so hard, in the numbers of its own law.
 #[must_use]
 pub fn with_hard_flanks(shape: &[f64], hz: f64) -> Option<Vec<f64>> {
-    let &[width_um, _, share, friction_share, _] = shape else { return None };
-    Some(vec![width_um, share, friction_share, hz])
+    let &[width_um, _, share, rubbing, _] = shape else { return None };
+    Some(vec![width_um, share, rubbing * share, hz])
 }
 
 /// A spring with a little play in what it loses; `None` where there is play already.
@@ -150,18 +202,7 @@ pub fn with_little_play(frame: &Frame, spring: &TwoMasses) -> Option<Vec<Vec<f64
     // It loses as much, or it swings as fast.
     let with = |softer: f64| {
         let width_um = LITTLE_PLAY * lost(frame, spring) / frame.axis.drive.motor_per_um();
-        vec![width_um, own_hz * (share / 0.5 / softer).sqrt(), share, rubbing * share, damping]
+        vec![width_um, own_hz / softer.sqrt(), share, rubbing, damping]
     };
     Some([1.0 - LITTLE_PLAY, 1.0].map(with).into())
-}
-
-/// The same with other masses of the table.
-#[must_use]
-pub fn of_any_mass(shape: &[f64]) -> Vec<Vec<f64>> {
-    let with = |share: f64| {
-        let mut shape = shape.to_vec();
-        shape[2] = share;
-        shape
-    };
-    SHARES.map(with).into()
 }
