@@ -46,11 +46,9 @@ impl Known {
         let resistance = Arc::new(Resistance::of(frame, axis));
         let mut known = Known { trace, doubt, resistance };
         if let Some(apart) = table_side::believed(frame, axis, &known.resistance) {
-            let there = |cause| axis.effects.iter().any(|effect| effect.cause() == cause);
-            // Behind a spring flanks meet softly.
-            let impacts = there(Cause::Backlash) && !there(Cause::DriveCompliance);
-            known.add(frame, &[(&apart, 1.0)], [if impacts { IMPACT_HOLDS } else { LAW_HOLDS }, LAW_HOLDS]);
-            if impacts {
+            let flanks = axis.effects.iter().any(|e| e.cause() == Cause::Backlash);
+            known.add(frame, &[(&apart, 1.0)], [if flanks { IMPACT_HOLDS } else { LAW_HOLDS }, LAW_HOLDS]);
+            if flanks {
                 known.doubt_crossings(frame, &apart.table);
             }
         }
