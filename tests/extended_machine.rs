@@ -192,6 +192,25 @@ fn what_a_load_winds_up_is_not_taken_for_the_zero_of_the_scale() {
     assert!(table.before > 3e-3 && table.after < 0.02 * table.before, "{table:?}");
 }
 
+/// A vibration shakes the table, which swings under it: the motor feels two and a half times as much. What is found is what shakes, the
+/// loop by it goes as measured, and believed it is no discrepancy.
+#[test]
+fn a_vibration_shakes_the_table_behind_a_spring() {
+    let vibration = Effect::ExternalVibration { frequency_hz: 30.0, amplitude: 0.08 };
+    let recording = recorded(&rig(&[SPRING, vibration]), &test_moves(), 9);
+    let d = judged(&rig(&[]), &recording);
+    let found = d.findings.iter().find(|finding| finding.effect.cause() == Cause::ExternalVibration);
+    let Some(Effect::ExternalVibration { amplitude, .. }) = found.map(|found| found.effect) else {
+        panic!("{:?} {:?}", d.verdict, d.findings)
+    };
+    println!("{amplitude} {:?} {:?}", found.unwrap().deviations, d.gains);
+    assert!((amplitude / 0.08 - 1.0).abs() < 0.05, "{amplitude}");
+    let position = d.gains.iter().find(|gain| gain.channel == "position").unwrap();
+    assert!(position.after < 0.2 * position.before, "{position:?}");
+    let again = judged(&d.extended, &recorded(&rig(&[SPRING, vibration]), &test_moves(), 10));
+    assert_eq!(again.verdict, Verdict::NoDiscrepancy, "{:?}", again.findings);
+}
+
 /// A recording may begin while the axis moves: how a spring is wound up then, nobody knows, and a table that swings freely for most
 /// of a second is no discrepancy. A stroke later something that is one is found all the same.
 #[test]

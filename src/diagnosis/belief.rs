@@ -142,7 +142,26 @@ pub fn extended(axis: &Axis, found: &[Effect]) -> Axis {
 pub fn with_found(axis: &Axis, fitted: &Axis, found: Vec<Effect>) -> Axis {
     let mut effects: Vec<Effect> = found.into_iter().map(|effect| together(axis, effect)).collect();
     reconcile(fitted, effects.iter_mut());
+    let whole = extended(axis, &effects);
+    effects.iter_mut().for_each(|effect| at_the_table(&whole, effect, &mut []));
     extended(axis, &effects)
+}
+
+/// How much larger the motor of an axis feels an effect than that is: a vibration shakes the table, which swings under it.
+#[must_use]
+pub fn felt(axis: &Axis, effect: &Effect) -> f64 {
+    let Effect::ExternalVibration { frequency_hz, .. } = effect else { return 1.0 };
+    axis.two_masses().ok().flatten().map_or(1.0, |masses| masses.passes(TAU * frequency_hz).0)
+}
+
+/// Turns a vibration that was fitted as what the motor of an axis feels into how it shakes the table, with its deviations if there are any.
+pub fn at_the_table(axis: &Axis, effect: &mut Effect, deviations: &mut [f64]) {
+    let felt = felt(axis, effect);
+    if let Effect::ExternalVibration { amplitude, .. } = effect {
+        *amplitude /= felt;
+        // The frequency is what it is.
+        deviations.iter_mut().skip(1).for_each(|deviation| *deviation /= felt);
+    }
 }
 
 #[cfg(test)]
@@ -195,6 +214,28 @@ mod tests {
             (before.motor_inertia + 0.001, after.motor_inertia),
         ] {
             assert!((a / b - 1.0).abs() < 1e-9, "{before:?} {after:?}");
+        }
+    }
+
+    #[test]
+    fn a_vibration_is_felt_as_the_table_swings_under_it() {
+        let axis = Axis { effects: Vec::new(), ..axis() };
+        // The table by itself swings at 60·√(1 − 0.5) = 42.4 Hz.
+        let spring = Effect::DriveCompliance {
+            resonance_hz: 60.0,
+            stiffness_n_um: 0.5 * 0.5 * 0.003 * (TAU * 60.0).powi(2) / axis.drive.motor_stiffness(1.0),
+            table_inertia_share: 0.5,
+            table_friction_share: 0.5,
+            damping_ratio: 1e-6,
+        };
+        let found = [18.0, 36.0, 85.0].map(|frequency_hz| {
+            let vibration = Effect::ExternalVibration { frequency_hz, amplitude: 0.1 };
+            let axis = with_found(&axis, &axis, vec![vibration, spring]);
+            let Effect::ExternalVibration { amplitude, .. } = axis.effects[0] else { panic!() };
+            amplitude / 0.1
+        });
+        for (found, right) in found.iter().zip([0.82, 0.28, 3.014]) {
+            assert!((found / right - 1.0).abs() < 1e-3, "{found} {right}");
         }
     }
 

@@ -5,6 +5,7 @@
 //! the believed parameters. The phase of a periodic one belongs to the recording: sine and cosine are fitted to what the others
 //! leave, and their amplitude is the believed one.
 
+use super::belief;
 use super::causes::{Law, Resistance, Trace, law, table_side};
 use super::frame::Frame;
 use super::many::dot;
@@ -68,6 +69,7 @@ impl Known {
                 (known.regressors(frame, effect, shape).as_slice(), coefficients.as_slice())
             {
                 let (a, b) = phase(frame, &known.trace, sine, cosine);
+                let amplitude = amplitude * belief::felt(axis, effect);
                 known.add(frame, &[(sine, amplitude * a), (cosine, amplitude * b)], [LAW_HOLDS; 2]);
             }
         }

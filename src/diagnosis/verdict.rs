@@ -418,6 +418,8 @@ fn findings(axis: &Axis, bench: &Bench, selection: &Selection, sure: Option<&Sur
         }
     }
     belief::reconcile(bench.frame.axis, found.iter_mut().map(|(.., effect, _)| effect));
+    let whole = belief::extended(axis, &found.iter().map(|(.., effect, _)| *effect).collect::<Vec<_>>());
+    found.iter_mut().for_each(|(.., effect, deviations)| belief::at_the_table(&whole, effect, deviations));
     let total = 1.0 - (fit.squares() / empty.squares()).min(1.0);
     let drops: Vec<f64> =
         (0..fit.parts.len()).map(|i| (bench.without(fit, i).squares() - fit.squares()).max(0.0)).collect();

@@ -24,6 +24,18 @@ pub struct TwoMasses {
     pub table_friction_share: f64,
 }
 
+impl TwoMasses {
+    /// What the motor must hold of a torque of angular frequency ω that shakes the table, as a share of it, and by what angle that is late,
+    /// rad: the table swings under it, (k + icω)/(k − J₂ω² + icω).
+    #[must_use]
+    pub fn passes(&self, omega: f64) -> (f64, f64) {
+        let damped = self.damping * omega;
+        let swings = self.stiffness - self.table_inertia * omega * omega;
+        let share = self.stiffness.hypot(damped) / swings.hypot(damped).max(1e-300);
+        (share, damped.atan2(swings) - damped.atan2(self.stiffness))
+    }
+}
+
 impl Axis {
     /// Motor and table, where an effect (backlash, drive compliance) sets them apart; `None` for a rigid axis.
     ///

@@ -112,7 +112,10 @@ fn add_ripples(axis: &Axis, physics: &Physics, observed: &Observed, torque: &mut
     for i in observed.runs.iter().cloned().flatten() {
         let (x, v, t) = (motion.position[i], motion.velocity(i), observed.time_s[i] - observed.time_s[0]);
         let cogging = physics.cogging.iter().map(|ripple| seen(ripple, v, motion) * ripple.at(x));
-        let vibration = physics.vibration.iter().map(|ripple| seen(ripple, 1.0, motion) * ripple.at(t));
+        let vibration = physics.vibration.iter().map(|ripple| {
+            let (share, late) = felt(ripple, physics, motion);
+            share * ripple.at(t - late / ripple.wave)
+        });
         torque[i] += cogging.chain(vibration).sum::<f64>();
         torque[i] = physics.indicated(torque[i]).clamp(-axis.base.torque_limit, axis.base.torque_limit);
     }
@@ -122,6 +125,12 @@ fn add_ripples(axis: &Axis, physics: &Physics, observed: &Observed, torque: &mut
 /// way to it, which is not seen, and where rows are far apart would stand for a slow one.
 fn seen(ripple: &Ripple, speed: f64, motion: &Motion) -> f64 {
     passed(ripple.wave * speed.abs() / TAU, motion.cutoff_hz)
+}
+
+/// The share of a vibration that the motor must deliver, and by what angle that is late, rad: it shakes the table.
+fn felt(vibration: &Ripple, physics: &Physics, motion: &Motion) -> (f64, f64) {
+    let (passes, late) = physics.two_masses.map_or((1.0, 0.0), |masses| masses.passes(vibration.wave));
+    (seen(vibration, 1.0, motion) * passes, late)
 }
 
 /// Torque that the motor must deliver, without ripples, for one run of rows.
@@ -292,8 +301,9 @@ fn set_phases(physics: &mut Physics, observed: &Observed, delivered: &[f64], by_
         let v = motion.velocity(i);
         let nuisance = [1.0, v, v.signum(), motion.acceleration(i)];
         let waves = shown.iter().flat_map(|&k| {
-            let (share, angle) =
-                (seen(&ripples[k], if k < cogging { v } else { 1.0 }, motion), ripples[k].wave * along(k, i));
+            let (share, late) =
+                if k < cogging { (seen(&ripples[k], v, motion), 0.0) } else { felt(&ripples[k], physics, motion) };
+            let angle = ripples[k].wave * along(k, i) - late;
             [share * angle.sin(), share * angle.cos()]
         });
         balance.add(nuisance.into_iter().chain(waves), left);
