@@ -2,7 +2,7 @@
 //! left or is made good by what has no part in it. So where much is left beside either, both together are tried in its place.
 //!
 //! The swing and the impacts make the sum of squares rugged: the two are approached on sums over shorter and shorter times. Sums over many
-//! swings tell how much is play and how much is wound up, and only short ones how heavy the table is.
+//! swings tell what is lost at a reversal, and only shorter ones how much of that is play, how the table swings and how heavy it is.
 
 use super::causes::{Law, Resistance, law, loose_spring, table_side};
 use super::fit::{Bench, Fit, Part};

@@ -3,7 +3,7 @@
 //! The effect is then looked for as if nothing were known of it, and what is found takes its place.
 
 use super::belief;
-use super::causes::{Law, law, loose_spring, position_dependent_friction};
+use super::causes::{LAWS, Law, law, loose_spring, position_dependent_friction};
 use super::fit::{Bench, Fit};
 use super::frame::Frame;
 use super::judge::{TOLERABLE_EXCESS, rms};
@@ -74,15 +74,14 @@ struct Suspect {
 
 /// Each effect by itself, but a spring and its play together: those are simulated as one.
 fn suspects(axis: &Axis, frame: &Frame) -> Vec<Suspect> {
-    const OF_ONE: [Cause; 2] = [Cause::Backlash, Cause::DriveCompliance];
-    let is_of_one = |effect: &Effect| OF_ONE.contains(&effect.cause());
+    let is_of_one = |effect: &Effect| law(effect.cause()).is_simulated();
     let loose_spring = || {
         let without = axis.with_effects(axis.effects.iter().copied().filter(|effect| !is_of_one(effect)).collect());
         let shape = loose_spring::shape_of(frame, &axis.two_masses().ok()??);
-        let laws = OF_ONE.map(law).into();
+        let laws = LAWS.iter().copied().filter(|law| law.is_simulated()).collect();
         Some(Suspect { without, believed: (&loose_spring::LAW, shape), laws, most_left: MOST_LEFT })
     };
-    let both = axis.effects.iter().filter(|effect| is_of_one(effect)).count() == OF_ONE.len();
+    let both = axis.effects.iter().filter(|effect| is_of_one(effect)).count() > 1;
     let by_itself = |(i, effect): (usize, &Effect)| {
         let believed = numbers(axis, frame, effect).filter(|_| is_by_itself(axis, effect))?;
         let mut others = axis.effects.clone();

@@ -109,13 +109,18 @@ fn needed_in_all(physics: &Physics, observed: &Observed) -> Vec<f64> {
 /// Puts ripples on what the motor must deliver, and what it cannot deliver off.
 fn add_ripples(axis: &Axis, physics: &Physics, observed: &Observed, torque: &mut [f64]) {
     let motion = &observed.motion;
+    let vibrations: Vec<(Ripple, f64)> = physics
+        .vibration
+        .iter()
+        .map(|ripple| {
+            let (share, late) = held_by_motor(ripple, physics, motion);
+            (Ripple { phase: ripple.phase - late, ..*ripple }, share)
+        })
+        .collect();
     for i in observed.runs.iter().cloned().flatten() {
         let (x, v, t) = (motion.position[i], motion.velocity(i), observed.time_s[i] - observed.time_s[0]);
         let cogging = physics.cogging.iter().map(|ripple| seen(ripple, v, motion) * ripple.at(x));
-        let vibration = physics.vibration.iter().map(|ripple| {
-            let (share, late) = felt(ripple, physics, motion);
-            share * ripple.at(t - late / ripple.wave)
-        });
+        let vibration = vibrations.iter().map(|(ripple, share)| share * ripple.at(t));
         torque[i] += cogging.chain(vibration).sum::<f64>();
         torque[i] = physics.indicated(torque[i]).clamp(-axis.base.torque_limit, axis.base.torque_limit);
     }
@@ -128,7 +133,7 @@ fn seen(ripple: &Ripple, speed: f64, motion: &Motion) -> f64 {
 }
 
 /// The share of a vibration that the motor must deliver, and by what angle that is late, rad: it shakes the table.
-fn felt(vibration: &Ripple, physics: &Physics, motion: &Motion) -> (f64, f64) {
+fn held_by_motor(vibration: &Ripple, physics: &Physics, motion: &Motion) -> (f64, f64) {
     let (passes, late) = physics.two_masses.map_or((1.0, 0.0), |masses| masses.passes(vibration.wave));
     (seen(vibration, 1.0, motion) * passes, late)
 }
@@ -294,6 +299,7 @@ fn set_phases(physics: &mut Physics, observed: &Observed, delivered: &[f64], by_
     let ripples: Vec<Ripple> = physics.cogging.iter().chain(&physics.vibration).copied().collect();
     let shown = |k: &usize| (reach[*k].1 - reach[*k].0) * ripples[*k].wave >= std::f64::consts::PI;
     let shown: Vec<usize> = (0..count).filter(shown).collect();
+    let held: Vec<(f64, f64)> = physics.vibration.iter().map(|ripple| held_by_motor(ripple, physics, motion)).collect();
     // A wrong base value must not turn the phase: it is let free beside the ripples, as far as one may be wrong. At a steady speed what
     // moves is the ripple's own answer, and the servo's to the encoder's noise, by which any base value would do.
     let mut balance = Balance::of(4 + 2 * shown.len());
@@ -301,8 +307,7 @@ fn set_phases(physics: &mut Physics, observed: &Observed, delivered: &[f64], by_
         let v = motion.velocity(i);
         let nuisance = [1.0, v, v.signum(), motion.acceleration(i)];
         let waves = shown.iter().flat_map(|&k| {
-            let (share, late) =
-                if k < cogging { (seen(&ripples[k], v, motion), 0.0) } else { felt(&ripples[k], physics, motion) };
+            let (share, late) = if k < cogging { (seen(&ripples[k], v, motion), 0.0) } else { held[k - cogging] };
             let angle = ripples[k].wave * along(k, i) - late;
             [share * angle.sin(), share * angle.cos()]
         });
