@@ -66,7 +66,7 @@ fn the_position_tells_numbers_that_the_noise_of_the_torque_hides() {
             squares[0].sqrt(),
             squares[1].sqrt()
         );
-        assert!(squares[0] < squares[1] / 16.0 && inside >= 7, "{truth:?}: {squares:?}, {inside} of 8 intervals hold");
+        assert!(squares[0] < squares[1] / 9.0 && inside >= 7, "{truth:?}: {squares:?}, {inside} of 8 intervals hold");
     }
 
     let truth = Effect::CoulombFrictionMismatch { torque: 1.1 };
@@ -192,23 +192,47 @@ fn what_a_load_winds_up_is_not_taken_for_the_zero_of_the_scale() {
     assert!(table.before > 3e-3 && table.after < 0.02 * table.before, "{table:?}");
 }
 
-/// A vibration shakes the table, which swings under it: the motor feels two and a half times as much. What is found is what shakes, the
-/// loop by it goes as measured, and believed it is no discrepancy.
+/// A vibration shakes the table, which swings under it as it slides and is held as it rests: the motor feels twice as much. What is found is
+/// what shakes, the loop by it goes as measured, and believed it is no discrepancy, neither in the torque nor in the place of the table.
 #[test]
 fn a_vibration_shakes_the_table_behind_a_spring() {
     let vibration = Effect::ExternalVibration { frequency_hz: 30.0, amplitude: 0.08 };
-    let recording = recorded(&rig(&[SPRING, vibration]), &test_moves(), 9);
+    let truth = rig(&[SPRING, vibration]);
+    for scale in [false, true] {
+        let record = |seed: u64| recorded_by(&truth, &test_moves(), seed, good(0.03), scale);
+        let d = judged(&rig(&[]), &record(9));
+        let numbers = |cause| d.findings.iter().find(|f| f.effect.cause() == cause).map(|f| f.effect);
+        println!("{:?} {:?}", d.findings, d.gains);
+        let (Some(Effect::ExternalVibration { amplitude, .. }), Some(Effect::DriveCompliance { resonance_hz, .. })) =
+            (numbers(Cause::ExternalVibration), numbers(Cause::DriveCompliance))
+        else {
+            panic!("{scale} {:?} {:?}", d.verdict, d.findings)
+        };
+        assert!((amplitude / 0.08 - 1.0).abs() < 0.02, "{scale} {amplitude}");
+        assert!((resonance_hz / 55.0 - 1.0).abs() < 0.02, "{scale} {resonance_hz}");
+        assert_eq!((d.verdict, d.findings.len()), (Verdict::Explained, 2), "{scale}");
+        for gain in d.gains.iter().filter(|gain| gain.channel != "torque") {
+            assert!(gain.after < 0.2 * gain.before, "{scale} {gain:?}");
+        }
+        for believed in [&d.extended, &truth] {
+            let again = judged(believed, &record(10));
+            assert_eq!(again.verdict, Verdict::NoDiscrepancy, "{scale} {:?} {:?}", again.findings, again.unexplained);
+        }
+    }
+}
+
+/// Of a long recording few rows are judged, and a vibration may be faster than they come.
+#[test]
+fn a_fast_vibration_is_found_in_a_long_recording() {
+    let truth = rig(&[Effect::ExternalVibration { frequency_hz: 83.0, amplitude: 0.08 }]);
+    let mut moves = test_moves();
+    moves.moves = moves.moves.repeat(2);
+    let recording = recorded(&truth, &moves, 9);
+    assert!(recording.time_s.last().is_some_and(|end| *end > 150.0));
     let d = judged(&rig(&[]), &recording);
-    let found = d.findings.iter().find(|finding| finding.effect.cause() == Cause::ExternalVibration);
-    let Some(Effect::ExternalVibration { amplitude, .. }) = found.map(|found| found.effect) else {
-        panic!("{:?} {:?}", d.verdict, d.findings)
-    };
-    println!("{amplitude} {:?} {:?}", found.unwrap().deviations, d.gains);
-    assert!((amplitude / 0.08 - 1.0).abs() < 0.05, "{amplitude}");
-    let position = d.gains.iter().find(|gain| gain.channel == "position").unwrap();
-    assert!(position.after < 0.2 * position.before, "{position:?}");
-    let again = judged(&d.extended, &recorded(&rig(&[SPRING, vibration]), &test_moves(), 10));
-    assert_eq!(again.verdict, Verdict::NoDiscrepancy, "{:?}", again.findings);
+    assert_eq!((named(&d), d.verdict), (vec![Cause::ExternalVibration], Verdict::Explained), "{:?}", d.unexplained);
+    let Effect::ExternalVibration { frequency_hz, amplitude } = d.findings[0].effect else { panic!() };
+    assert!((frequency_hz - 83.0).abs() < 1e-3 && (amplitude / 0.08 - 1.0).abs() < 0.02, "{frequency_hz} {amplitude}");
 }
 
 /// A recording may begin while the axis moves: how a spring is wound up then, nobody knows, and a table that swings freely for most

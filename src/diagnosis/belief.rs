@@ -1,6 +1,6 @@
 //! What of a belief stays open to be found, and how what is found joins it.
 
-use crate::machine::{Axis, Cause, Effect};
+use crate::machine::{Axis, Cause, Effect, TwoMasses};
 use std::f64::consts::TAU;
 
 /// Whether an effect of the belief is one of its base values or its timing, which the balance itself takes care of.
@@ -151,7 +151,8 @@ pub fn with_found(axis: &Axis, fitted: &Axis, found: Vec<Effect>) -> Axis {
 #[must_use]
 pub fn felt(axis: &Axis, effect: &Effect) -> f64 {
     let Effect::ExternalVibration { frequency_hz, .. } = effect else { return 1.0 };
-    axis.two_masses().ok().flatten().map_or(1.0, |masses| masses.passes(TAU * frequency_hz).0)
+    let through = |masses: TwoMasses| masses.passes(TAU * frequency_hz, axis.belief().viscous).0;
+    axis.two_masses().ok().flatten().map_or(1.0, through)
 }
 
 /// Turns a vibration that was fitted as what the motor of an axis feels into how it shakes the table, with its deviations if there are any.

@@ -14,7 +14,7 @@ mod swings;
 use super::filter::{LowPass, convolve, norm, of_three};
 use super::grids;
 use super::many::{decay, to_the_power, weighted_sums, widest};
-use super::rows::{beside_filled, direction_of, doubtful_rows, judged_rows, resting_rows};
+use super::rows::{Judged, beside_filled, direction_of, doubtful_rows, judged_rows, resting_rows};
 use super::sampling::{NUMEROV, Sampling};
 use crate::analysis::statistics;
 use crate::machine::{Axis, Belief, Effect};
@@ -104,6 +104,8 @@ pub struct Frame<'a> {
     pub believed_late_s: f64,
     /// Rows that are judged.
     pub kept: Vec<usize>,
+    /// Rows from one to the next where all between them carry weight: in the mean, and at most.
+    pub apart: [usize; 2],
     /// Weight of each judged row in the torque balance, mean square 1: less where friction may have been at rest.
     pub weights: Vec<f64>,
     /// First index into `kept` of each block, and the end.
@@ -189,7 +191,7 @@ impl<'a> Frame<'a> {
         // A rest goes on for many rows, all off by the same: no weight makes them as many that say something.
         let rests = |row: usize| level > NOTHING_AT_REST * kernel_norm && doubt[row] > 0.5;
         let carries = |row: usize| !filled[row] && weight_of(row) > LEAST_WEIGHT && !rests(row);
-        let kept = judged_rows(columns, margin, low_pass.width / 2 + 1, carries);
+        let Judged { rows: kept, apart } = judged_rows(columns, margin, low_pass.width / 2 + 1, carries);
         let mut weights: Vec<f64> = kept.iter().map(|&row| weight_of(row)).collect();
         let mean = (weights.iter().map(|w| w * w).sum::<f64>() / weights.len().max(1) as f64).sqrt();
         weights.iter_mut().for_each(|w| *w /= mean.max(LEAST_WEIGHT));
@@ -213,6 +215,7 @@ impl<'a> Frame<'a> {
             lateness,
             believed_late_s: lateness.of_delay(believed_delay(axis)),
             kept,
+            apart,
             weights,
             blocks,
             acceleration,

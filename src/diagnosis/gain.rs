@@ -248,14 +248,13 @@ fn half_of_rows(bench: &Bench, time_s: &[f64]) -> Vec<usize> {
 
 /// For each row the lesser weight of the two judged rows about it; NaN where rows between them are not judged.
 pub(super) fn weight_of_rows(frame: &Frame, time_s: &[f64]) -> Vec<f64> {
-    let stride = frame.kept.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap_or(1);
     let mut after = 0;
     let of = |&t: &f64| {
         while after < frame.kept.len() && frame.columns.time_s[frame.kept[after]] < t {
             after += 1;
         }
         let before = after.max(1) - 1;
-        let close = after < frame.kept.len() && frame.kept[after] - frame.kept[before] <= stride;
+        let close = after < frame.kept.len() && frame.kept[after] - frame.kept[before] <= frame.apart[1];
         if close { frame.weights[before].min(frame.weights[after]) } else { f64::NAN }
     };
     time_s.iter().map(of).collect()

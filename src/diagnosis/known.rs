@@ -46,9 +46,10 @@ impl Known {
         let doubt = Trace { torque: frame.coarse_torque(), table: vec![0.0; trace.table.len()] };
         let resistance = Arc::new(Resistance::of(frame, axis));
         let mut known = Known { trace, doubt, resistance };
-        if let Some(apart) = table_side::believed(frame, axis, &known.resistance) {
+        let apart = table_side::believed(frame, axis, &known.resistance);
+        if let Some(apart) = &apart {
             let flanks = axis.effects.iter().any(|e| e.cause() == Cause::Backlash);
-            known.add(frame, &[(&apart, 1.0)], [if flanks { IMPACT_HOLDS } else { LAW_HOLDS }, LAW_HOLDS]);
+            known.add(frame, &[(apart, 1.0)], [if flanks { IMPACT_HOLDS } else { LAW_HOLDS }, LAW_HOLDS]);
             if flanks {
                 known.doubt_crossings(frame, &apart.table);
             }
@@ -63,6 +64,7 @@ impl Known {
             let regressors = known.regressors(frame, effect, shape);
             known.add(frame, &regressors.iter().zip(coefficients).collect::<Vec<_>>(), [LAW_HOLDS; 2]);
         }
+        let mut shaking = Vec::new();
         for effect in periodic {
             let Some((shape, coefficients)) = by_its_law(frame, effect) else { continue };
             if let ([sine, cosine], [amplitude]) =
@@ -71,9 +73,33 @@ impl Known {
                 let (a, b) = phase(frame, &known.trace, sine, cosine);
                 let amplitude = amplitude * belief::felt(axis, effect);
                 known.add(frame, &[(sine, amplitude * a), (cosine, amplitude * b)], [LAW_HOLDS; 2]);
+                let shape = by_its_law(frame, effect).map(|(shape, _)| shape);
+                shaking.extend(shape.map(|shape| (law(effect.cause()), shape, [amplitude * a, amplitude * b])));
             }
         }
+        if let Some(apart) = &apart {
+            known.shake(frame, axis, apart, &shaking);
+        }
         known
+    }
+
+    /// Takes it that causes with these numbers shake the table, of which this was the trace without them.
+    fn shake(&mut self, frame: &Frame, axis: &Axis, apart: &Trace, shaking: &[(&Law, Vec<f64>, [f64; 2])]) {
+        let shaken =
+            |under: Resistance, (law, shape, c): &(&Law, Vec<f64>, [f64; 2])| under.shaken_by(frame, law, shape, c);
+        let resistance = shaking.iter().fold((*self.resistance).clone(), shaken);
+        if resistance == *self.resistance {
+            return;
+        }
+        if let Some(trace) = table_side::believed(frame, axis, &resistance) {
+            for (sum, now, before) in [
+                (&mut self.trace.torque, &trace.torque, &apart.torque),
+                (&mut self.trace.table, &trace.table, &apart.table),
+            ] {
+                sum.iter_mut().zip(now.iter().zip(before)).for_each(|(sum, (now, before))| *sum += now - before);
+            }
+        }
+        self.resistance = Arc::new(resistance);
     }
 
     fn regressors(&self, frame: &Frame, effect: &Effect, shape: Vec<f64>) -> Vec<Trace> {

@@ -1,10 +1,13 @@
 //! Where an axis rests, which way it slides, and which rows of a recording can be judged.
 
 use super::frame::Columns;
+use crate::plant::noise::Noise;
 use std::ops::Range;
 
 /// Most rows on which causes are compared; more are thinned evenly, which costs time and gains nothing.
 const MOST_KEPT: usize = 12_000;
+/// Of how many and more one is taken unevenly.
+const UNEVEN: usize = 3;
 
 /// Rows at which the axis rests as far as the encoder can tell: no step for some rows, and no travel around them.
 pub fn resting_rows(columns: &Columns, resolution: f64) -> Vec<bool> {
@@ -103,8 +106,18 @@ pub fn beside_filled(columns: &Columns, margin: usize) -> Vec<bool> {
     beside
 }
 
-/// Rows away from the ends of their stretch, thinned to the filter's own density, that carry weight.
-pub fn judged_rows(columns: &Columns, margin: usize, stride: usize, carries: impl Fn(usize) -> bool) -> Vec<usize> {
+/// Rows that are judged.
+#[derive(Debug, Clone, Default)]
+pub struct Judged {
+    /// Which.
+    pub rows: Vec<usize>,
+    /// From one to the next where all between them carry weight: in the mean, and at most.
+    pub apart: [usize; 2],
+}
+
+/// Rows away from the ends of their stretch, thinned to the filter's own density, that carry weight. Of a long recording one of several
+/// such, each anywhere among them: a wave that is faster than the rows come is no slower one in uneven rows (Shapiro and Silverman 1960).
+pub fn judged_rows(columns: &Columns, margin: usize, stride: usize, carries: impl Fn(usize) -> bool) -> Judged {
     let mut kept = Vec::new();
     let stroke = extent(&columns.position);
     for s in &columns.stretches {
@@ -114,5 +127,48 @@ pub fn judged_rows(columns: &Columns, margin: usize, stride: usize, carries: imp
         }
     }
     let thin = kept.len().div_ceil(MOST_KEPT).max(1);
-    kept.into_iter().step_by(thin).collect()
+    if thin < UNEVEN {
+        return Judged { rows: kept.into_iter().step_by(thin).collect(), apart: [thin * stride; 2] };
+    }
+    let mut any = Noise::new(0);
+    let one = |several: &[usize]| several[(any.uniform() * several.len() as f64) as usize];
+    Judged { rows: kept.chunks(thin).map(one).collect(), apart: [thin * stride, (2 * thin - 1) * stride] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_a_long_recording_are_one_of_several_and_show_fast_waves() {
+        let rows = 200_000;
+        let columns = Columns {
+            time_s: vec![0.0; rows],
+            position: (0..rows).map(|row| row as f64).collect(),
+            torque: vec![0.0; rows],
+            known: vec![true; rows],
+            command: None,
+            table: None,
+            stretches: vec![0..rows],
+            torque_step: 0.0,
+            position_grid: 0.0,
+            table_grid: 0.0,
+            period_s: 1e-3,
+            recorded_period_s: 1e-3,
+            left_out: 0,
+        };
+        let Judged { rows: kept, apart } = judged_rows(&columns, 10, 2, |_| true);
+        let gaps: Vec<usize> = kept.windows(2).map(|w| w[1] - w[0]).collect();
+        assert!(kept.len() <= MOST_KEPT && apart == [18, 34], "{} {apart:?}", kept.len());
+        assert!(gaps.iter().all(|gap| *gap <= apart[1] && gap % 2 == 0) && gaps.iter().any(|gap| *gap == 2));
+        // A wave of 3.1 rows: one row in eighteen would take it for one of 93 rows, or see none of it at all.
+        let mean = |period: f64| {
+            let turns = kept.iter().map(|row| std::f64::consts::TAU * *row as f64 / period);
+            let (sum, count) = turns.fold((0.0, 0.0), |(sum, count), turn| (sum + turn.cos(), count + 1.0));
+            f64::abs(sum) / count
+        };
+        for period in [5.1, 18.0, 33.0, 92.6] {
+            assert!(mean(period) < 0.04, "{period}: {}", mean(period));
+        }
+    }
 }

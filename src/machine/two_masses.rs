@@ -25,14 +25,15 @@ pub struct TwoMasses {
 }
 
 impl TwoMasses {
-    /// What the motor must hold of a torque of angular frequency ω that shakes the table, as a share of it, and by what angle that is late,
-    /// rad: the table swings under it, (k + icω)/(k − J₂ω² + icω).
+    /// What the motor must hold of a torque of angular frequency ω that shakes the table as it slides, as a share of it, and by what angle
+    /// that is late, rad: the table swings under it, (k + icω)/(k − J₂ω² + i(c + φ·Tv)·ω), by the slope Tv of all viscous friction.
     #[must_use]
-    pub fn passes(&self, omega: f64) -> (f64, f64) {
+    pub fn passes(&self, omega: f64, viscous: f64) -> (f64, f64) {
         let damped = self.damping * omega;
+        let slowed = damped + self.table_friction_share * viscous * omega;
         let swings = self.stiffness - self.table_inertia * omega * omega;
-        let share = self.stiffness.hypot(damped) / swings.hypot(damped).max(1e-300);
-        (share, damped.atan2(swings) - damped.atan2(self.stiffness))
+        let share = self.stiffness.hypot(damped) / swings.hypot(slowed).max(1e-300);
+        (share, slowed.atan2(swings) - damped.atan2(self.stiffness))
     }
 }
 

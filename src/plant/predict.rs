@@ -44,9 +44,14 @@ pub struct TorquePrediction {
 pub fn predict_torque(axis: &Axis, observed: &Observed) -> Result<TorquePrediction, String> {
     let mut physics = Physics::of(axis)?;
     set_table_phases(&mut physics, observed);
-    let mut torque = needed_in_all(&physics, observed);
+    let mut unshaken = physics.clone();
+    unshaken.vibration.clear();
+    let mut torque = needed_in_all(&unshaken, observed);
     let shown = Shown::of(axis, &physics, observed);
     let phases_unknown = set_phases(&mut physics, observed, &torque, shown.by_rows);
+    if shakes_a_table(&physics) {
+        torque = needed_in_all(&physics, observed);
+    }
     add_ripples(axis, &physics, observed, &mut torque);
     let at_start = torque.first().copied().unwrap_or(f64::NAN);
     shown.delay(observed, &mut torque);
@@ -87,11 +92,17 @@ impl Shown {
     }
 }
 
-/// Torque that the motor must deliver, without ripples; NaN where the motion is not known.
+/// Whether vibrations shake a table that is set apart from its motor: it swings under them as it slides, and rests as friction holds it.
+fn shakes_a_table(physics: &Physics) -> bool {
+    physics.two_masses.is_some() && !physics.vibration.is_empty()
+}
+
+/// Torque that the motor must deliver, without ripples but with what shakes a table that is set apart; NaN where the motion is not known.
 fn needed_in_all(physics: &Physics, observed: &Observed) -> Vec<f64> {
     let mut physics = physics.clone();
-    physics.cogging.clear();
-    physics.vibration.clear();
+    if !shakes_a_table(&physics) {
+        physics.vibration.clear();
+    }
     let mut torque = Vec::new();
     for run in &observed.runs {
         let needed = needed_torque(&physics, observed, run.clone());
@@ -109,18 +120,12 @@ fn needed_in_all(physics: &Physics, observed: &Observed) -> Vec<f64> {
 /// Puts ripples on what the motor must deliver, and what it cannot deliver off.
 fn add_ripples(axis: &Axis, physics: &Physics, observed: &Observed, torque: &mut [f64]) {
     let motion = &observed.motion;
-    let vibrations: Vec<(Ripple, f64)> = physics
-        .vibration
-        .iter()
-        .map(|ripple| {
-            let (share, late) = held_by_motor(ripple, physics, motion);
-            (Ripple { phase: ripple.phase - late, ..*ripple }, share)
-        })
-        .collect();
+    // What shakes a table that is set apart is there already.
+    let vibrations = if shakes_a_table(physics) { &[][..] } else { &physics.vibration };
     for i in observed.runs.iter().cloned().flatten() {
         let (x, v, t) = (motion.position[i], motion.velocity(i), observed.time_s[i] - observed.time_s[0]);
         let cogging = physics.cogging.iter().map(|ripple| seen(ripple, v, motion) * ripple.at(x));
-        let vibration = vibrations.iter().map(|(ripple, share)| share * ripple.at(t));
+        let vibration = vibrations.iter().map(|ripple| seen(ripple, 1.0, motion) * ripple.at(t));
         torque[i] += cogging.chain(vibration).sum::<f64>();
         torque[i] = physics.indicated(torque[i]).clamp(-axis.base.torque_limit, axis.base.torque_limit);
     }
@@ -132,9 +137,10 @@ fn seen(ripple: &Ripple, speed: f64, motion: &Motion) -> f64 {
     passed(ripple.wave * speed.abs() / TAU, motion.cutoff_hz)
 }
 
-/// The share of a vibration that the motor must deliver, and by what angle that is late, rad: it shakes the table.
+/// The share of a vibration that the motor must deliver while its table slides, and by what angle that is late, rad.
 fn held_by_motor(vibration: &Ripple, physics: &Physics, motion: &Motion) -> (f64, f64) {
-    let (passes, late) = physics.two_masses.map_or((1.0, 0.0), |masses| masses.passes(vibration.wave));
+    let through = |masses: TwoMasses| masses.passes(vibration.wave, physics.slope_at(0.0));
+    let (passes, late) = physics.two_masses.map_or((1.0, 0.0), through);
     (seen(vibration, 1.0, motion) * passes, late)
 }
 

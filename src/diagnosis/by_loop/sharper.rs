@@ -17,7 +17,7 @@ use crate::diagnosis::judge::refuted;
 use crate::diagnosis::progress::{Stopped, Watch};
 use crate::diagnosis::verdict::{Diagnosis, Verdict};
 use crate::diagnosis::{belief, verdict::Finding};
-use crate::machine::{Axis, Effect};
+use crate::machine::{Axis, Cause, Effect};
 use crate::plant::added::ByServo;
 use crate::plant::observed::Observed;
 
@@ -57,6 +57,11 @@ pub fn sharpened(
         return Ok(None);
     };
     let cause = parting.effect.cause();
+    // How a vibration reaches the motor goes with the spring, and the torque alone tells both.
+    let shaken = found.extended.effects.iter().any(|effect| law(effect.cause()).is_shaking());
+    if cause == Cause::DriveCompliance && shaken {
+        return Ok(None);
+    }
     let missed = misses(&known.error, statistics::reading_error(&whole.position));
     if [GIVES, JUDGES].iter().any(|half| mean_of_worse_half(&missed, *half) < ASKED) {
         return Ok(None);

@@ -27,9 +27,9 @@ pub(super) mod table_side;
 pub(super) mod thermal_drift;
 
 use super::frame::Frame;
-use crate::machine::{Axis, Cause, Effect};
+use crate::machine::{Axis, Cause, Effect, TwoMasses};
 use rayon::prelude::*;
-pub use table_side::Resistance;
+pub use table_side::{Resistance, Shaking};
 
 /// A regressor at the judged rows: what one unit of a coefficient adds.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -136,6 +136,9 @@ const PLAIN: Manner = Manner {
 pub enum Terms {
     /// Worked out row by row.
     ByRows(fn(&Frame, &[Vec<f64>]) -> Vec<Term>),
+    /// The same, by what the axis has between motor and table, of what shakes the table; and how it does by non-linear parameters and
+    /// coefficients.
+    Shaking(fn(&Frame, Option<&TwoMasses>, &[Vec<f64>]) -> Vec<Term>, fn(&Frame, &[f64], &[f64]) -> Option<Shaking>),
     /// Simulated between the rows under what resists the table: an effect that parts it from the motor, by its non-linear parameters.
     Simulated(fn(&Frame, &[f64]) -> Option<Effect>),
 }
@@ -166,6 +169,7 @@ impl Law {
     pub fn terms(&self, frame: &Frame, resistance: &Resistance, shapes: &[Vec<f64>]) -> Vec<Term> {
         match self.terms {
             Terms::ByRows(terms) => terms(frame, shapes),
+            Terms::Shaking(terms, _) => terms(frame, resistance.link(), shapes),
             Terms::Simulated(effect) => {
                 let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(frame, shape)).collect();
                 table_side::terms(frame, resistance, &effects)
@@ -173,12 +177,22 @@ impl Law {
         }
     }
 
-    /// The traces of a simulated table under each of these resistances.
+    /// The traces under each of these resistances; those of a simulated table side by side.
     #[must_use]
     pub fn terms_under_each(&self, frame: &Frame, resistances: &[&Resistance], shape: &[f64]) -> Vec<Term> {
         match self.terms {
-            Terms::ByRows(terms) => resistances.iter().flat_map(|_| terms(frame, &[shape.to_vec()])).collect(),
             Terms::Simulated(effect) => table_side::terms_under_each(frame, resistances, effect(frame, shape)),
+            _ => resistances.iter().flat_map(|under| self.terms(frame, under, &[shape.to_vec()])).collect(),
+        }
+    }
+
+    /// Whether the traces are others under another resistance.
+    #[must_use]
+    pub fn is_otherwise(&self, under: &Resistance, other: &Resistance) -> bool {
+        match self.terms {
+            Terms::ByRows(_) => false,
+            Terms::Shaking(..) => under.link() != other.link(),
+            Terms::Simulated(_) => !under.is_like(other),
         }
     }
 
@@ -192,6 +206,21 @@ impl Law {
     #[must_use]
     pub fn is_simulated(&self) -> bool {
         matches!(self.terms, Terms::Simulated(_))
+    }
+
+    /// Whether the cause shakes the table.
+    #[must_use]
+    pub fn is_shaking(&self) -> bool {
+        matches!(self.terms, Terms::Shaking(..))
+    }
+
+    /// How the cause shakes a table; `None` of one that does not.
+    #[must_use]
+    pub fn shakes(&self, frame: &Frame, shape: &[f64], coefficients: &[f64]) -> Option<Shaking> {
+        match self.terms {
+            Terms::Shaking(_, shakes) => shakes(frame, shape, coefficients),
+            _ => None,
+        }
     }
 
     /// Whether a parameter is one of form, and as usual: it is not fitted then.

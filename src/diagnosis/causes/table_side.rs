@@ -13,7 +13,7 @@ mod flanks;
 mod resistance;
 mod spring;
 
-pub use resistance::{Resistance, at_once, built_up, level};
+pub use resistance::{Resistance, Shaking, at_once, built_up, level};
 
 use super::*;
 use crate::diagnosis::many::widest;
@@ -143,6 +143,10 @@ struct Tables<'a, const N: usize, R> {
     kept: [f64; N],
     /// How friction builds up on the tables' own way, of a table with all of it, where a step is short beside that way.
     bristles: Option<Bristles<N>>,
+    /// By what each is shaken of what its motor holds and of that a quarter of a period later, if any is. Flanks are not: what shakes their table is
+    /// passed on while they push.
+    shaken: [Vec<[f64; 2]>; N],
+    is_shaken: bool,
     /// Whether there is a dead zone: flanks push and never pull.
     flanks: bool,
     /// Behind flanks that meet so softly that they swing for long: those never move as one with the motor.
@@ -205,7 +209,16 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
         let piece_s = if flanks { step_s } else { frame.columns.period_s / pieces };
         let swings_slower = |(_, stiffness): &(_, f64)| (stiffness / lightest).sqrt() * piece_s < MOST_BRISTLE_RAD;
         let viscous = resistance.each(|r| r.viscous);
+        let of_lane = |l: usize| masses.get(l).or(masses.last()).filter(|_| !flanks);
+        let shaken = |(l, masses): (usize, &TwoMasses)| {
+            let waves = resistance.lane(l).shaking.iter();
+            waves.map(|wave| wave.at_the_table(masses, viscous[l])).collect()
+        };
+        let shaken: [Vec<_>; N] =
+            std::array::from_fn(|l| of_lane(l).map_or_else(Vec::new, |masses| shaken((l, masses))));
         Self {
+            is_shaken: shaken.iter().any(|waves| !waves.is_empty()),
+            shaken,
             frame,
             resistance,
             inertia,
@@ -252,8 +265,15 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
             let torques = self.frame.low_passed_together(extra);
             let tables =
                 if lags > 0 { self.frame.low_passed_together(lag) } else { std::array::from_fn(|_| Vec::new()) };
-            let term = |(torque, table)| Term { fixed: Some(Trace { torque, table }), regressors: Vec::new() };
-            torques.into_iter().zip(tables).take(count).map(term).collect()
+            let term = |(lane, (mut torque, mut table)): (usize, (Vec<f64>, Vec<f64>))| {
+                if !self.shaken[lane].is_empty() {
+                    let Trace { torque: held, table: swinging } = &self.resistance.lane(lane).sliding;
+                    torque.iter_mut().zip(held).for_each(|(torque, held)| *torque -= held);
+                    table.iter_mut().zip(swinging).for_each(|(table, swinging)| *table -= swinging);
+                }
+                Term { fixed: Some(Trace { torque, table }), regressors: Vec::new() }
+            };
+            torques.into_iter().zip(tables).take(count).enumerate().map(term).collect()
         })
     }
 
@@ -269,8 +289,13 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
     fn resisting_tables(&self, i: usize) -> Resisting<N> {
         let [even, load] = [self.resistance.each(|r| r.even[i]), self.resistance.each(|r| r.load[i])];
         let level = self.resistance.each(|r| r.level[i]);
+        let shaking = |l: usize| {
+            let waves = self.resistance.lane(l).shaking.iter().zip(&self.shaken[l]);
+            waves.map(|(wave, [held, quarter])| held * wave.held[i] + quarter * wave.quarter[i]).sum::<f64>()
+        };
+        let shaking: [f64; N] = if self.is_shaken { lanes(shaking) } else { [0.0; N] };
         let friction = lanes(|l| self.share[l] * level[l]);
-        Resisting { load: lanes(|l| load[l] + self.share[l] * even[l]), friction, level }
+        Resisting { load: lanes(|l| load[l] + shaking[l] + self.share[l] * even[l]), friction, level }
     }
 
     /// Torque that the link of a rigid axis carries at a row.

@@ -112,22 +112,36 @@ impl Bench<'_, '_> {
             part.law.effect(self.frame, &part.shape, c)
         };
         let effects = parts.iter().zip(coefficients).filter(|(part, _)| !part.law.is_simulated()).filter_map(effect);
-        let found: Vec<Effect> = effects.filter(Resistance::has).collect();
-        if found.is_empty() { self.resistance.clone() } else { Arc::new(self.resistance.with(self.frame, found)) }
+        let mut found: Vec<Effect> = effects.filter(Resistance::has).collect();
+        // What shakes the table does so behind what was found.
+        let shaking: Vec<_> = parts.iter().zip(coefficients).filter(|(part, _)| part.law.is_shaking()).collect();
+        if !shaking.is_empty() {
+            found.extend(parts.iter().zip(coefficients).filter(|(part, _)| part.law.is_simulated()).filter_map(effect));
+        }
+        if found.is_empty() {
+            return self.resistance.clone();
+        }
+        let resistance = self.resistance.with(self.frame, found);
+        let shaken =
+            |under: Resistance, (part, c): (&Part, &Vec<f64>)| under.shaken_by(self.frame, part.law, &part.shape, c);
+        Arc::new(shaking.into_iter().fold(resistance, shaken))
     }
 
-    /// A fit whose table, where one is simulated, moves under what its other causes make of friction and load.
+    /// A fit whose table, where one is simulated, moves under what its other causes make of friction and load, and is shaken behind it.
     #[must_use]
     pub fn at_one(&self, fit: Fit) -> Fit {
-        let Some(at) = fit.table() else { return fit };
-        let (part, resistance) = (&fit.parts[at], self.resistance_of(&fit));
-        if !moves_otherwise(part, &resistance) {
+        if fit.table().is_none() {
             return fit;
         }
-        let own = self.parts_under(part.law, vec![part.shape.clone()], &resistance);
-        let mut parts = fit.parts;
-        parts.splice(at..=at, own);
-        self.fit(parts)
+        let resistance = self.resistance_of(&fit);
+        if !fit.parts.iter().any(|part| moves_otherwise(part, &resistance)) {
+            return fit;
+        }
+        let own = |part: Part| match moves_otherwise(&part, &resistance) {
+            true => self.parts_under(part.law, vec![part.shape], &resistance).swap_remove(0),
+            false => part,
+        };
+        self.fit(fit.parts.into_iter().map(own).collect())
     }
 }
 
@@ -148,8 +162,7 @@ impl Until {
     }
 }
 
-/// Whether a table was simulated that moves otherwise under this.
+/// Whether a table moves otherwise under this.
 fn moves_otherwise(part: &Part, resistance: &Arc<Resistance>) -> bool {
-    let same = || Arc::ptr_eq(&part.resistance, resistance) || part.resistance.is_like(resistance);
-    part.law.is_simulated() && !same()
+    !Arc::ptr_eq(&part.resistance, resistance) && part.law.is_otherwise(&part.resistance, resistance)
 }

@@ -9,18 +9,26 @@ impl Frame<'_> {
     /// says that the column is torque, which went through the three-point mean as well.
     #[must_use]
     pub fn floor(&self, values: &[f64], averaged: bool) -> f64 {
-        let stride = self.kept.windows(2).map(|w| w[1] - w[0]).min().unwrap_or(1);
         let kernel = if averaged { &self.torque_kernel } else { &self.low_pass_kernel };
-        let correlation = |lag: usize| {
-            kernel.iter().zip(kernel.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>() / norm(kernel).powi(2)
-        };
+        let product = |lag: usize| kernel.iter().zip(kernel.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();
+        let correlations: Vec<f64> = (0..kernel.len()).map(|lag| product(lag) / norm(kernel).powi(2)).collect();
+        let correlation = |lag: usize| correlations.get(lag).copied().unwrap_or(0.0);
         let at_spacing = |m: usize| {
-            let gain = (6.0 - 8.0 * correlation(m * stride) + 2.0 * correlation(2 * m * stride)).max(1e-6).sqrt();
-            let seconds: Vec<f64> = (m..values.len().saturating_sub(m))
-                .filter(|&k| self.kept[k + m] - self.kept[k - m] == 2 * m * stride)
-                .map(|k| (values[k - m] - 2.0 * values[k] + values[k + m]).abs())
-                .collect();
-            median(&seconds).map(|median| 1.482_602 * median / gain)
+            let second = |k: usize| {
+                let [before, after] = [self.kept[k] - self.kept[k - m], self.kept[k + m] - self.kept[k]];
+                if before + after > 2 * m * self.apart[0] {
+                    return None;
+                }
+                // A row beside the line between two others.
+                let near = after as f64 / (before + after) as f64;
+                let far = 1.0 - near;
+                let [to_near, to_far, through] = [before, after, before + after].map(correlation);
+                let own = 1.0 + near * near + far * far;
+                let gain = own - 2.0 * (near * to_near + far * to_far) + 2.0 * near * far * through;
+                Some((values[k] - near * values[k - m] - far * values[k + m]).abs() / gain.max(1e-6).sqrt())
+            };
+            let seconds: Vec<f64> = (m..values.len().saturating_sub(m)).filter_map(second).collect();
+            median(&seconds).map(|median| 1.482_602 * median)
         };
         // Noise of the encoder's grid alternates from row to row and looks large at the least spacing, structure at wide
         // ones: the smallest estimate is the one least spoilt.

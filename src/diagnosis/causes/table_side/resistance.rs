@@ -2,11 +2,11 @@
 //! crossed, by all the friction that there is, not by that of the belief alone: behind a drive whose friction rises by a third the
 //! table lags by a third more.
 
-use super::lanes;
+use super::{Law, Trace, lanes};
 use crate::diagnosis::belief;
 use crate::diagnosis::frame::Frame;
-use crate::diagnosis::many::{apart, decay, dot, to_the_power, widest};
-use crate::machine::{Axis, Effect};
+use crate::diagnosis::many::{add, apart, decay, dot, to_the_power, widest};
+use crate::machine::{Axis, Effect, TwoMasses};
 use crate::plant::friction::Friction;
 use crate::plant::physics::Physics;
 
@@ -18,6 +18,12 @@ const ALIKE: f64 = 3e-4;
 pub struct Resistance {
     /// The axis that has it.
     axis: Axis,
+    /// What that has between motor and table.
+    link: Option<TwoMasses>,
+    /// What shakes a table behind a spring.
+    pub(super) shaking: Vec<Shaking>,
+    /// What one that slides all the time makes of it, at the judged rows: simulated ones show what they make else.
+    pub(super) sliding: Trace,
     /// Largest dry friction of the table at each row. At the speed that is measured, its own where it has a scale: one that is simulated
     /// behind a motor that moves as measured has no servo that answers, and friction which falls with its speed would set it swinging.
     pub(super) level: Vec<f64>,
@@ -33,22 +39,64 @@ pub struct Resistance {
     pub(super) bristle: Option<(Friction, f64)>,
 }
 
+/// What shakes a table, half way from each row to the next, drive's own unit: what a motor holds of it through a spring while the table
+/// slides, and the same a quarter of a period later.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shaking {
+    /// Angular frequency.
+    pub omega: f64,
+    /// As held.
+    pub held: Vec<f64>,
+    /// A quarter later.
+    pub quarter: Vec<f64>,
+}
+
+impl Shaking {
+    /// Of what is held, and of that a quarter later, what shakes a table that is behind this, by the slope of viscous friction.
+    #[must_use]
+    pub fn at_the_table(&self, masses: &TwoMasses, viscous: f64) -> [f64; 2] {
+        let (passes, late) = masses.passes(self.omega, viscous);
+        [late.cos() / passes, late.sin() / passes]
+    }
+}
+
 impl Resistance {
     /// That of an axis, whatever it has between motor and table.
     #[must_use]
     pub fn of(frame: &Frame, axis: &Axis) -> Self {
+        let link = axis.two_masses().ok().flatten();
         let resisting = axis.with_effects(axis.effects.iter().filter(|e| Self::has(e)).copied().collect());
         // What lies between motor and table is all that an axis may contradict itself in.
         match Physics::of(&resisting) {
-            Ok(physics) => Self::along(frame, axis, &physics),
-            Err(_) => Self::none(frame, axis),
+            Ok(physics) => Self { link, ..Self::along(frame, axis, &physics) },
+            Err(_) => Self { link, ..Self::none(frame, axis) },
         }
+    }
+
+    /// What the axis has between motor and table.
+    #[must_use]
+    pub fn link(&self) -> Option<&TwoMasses> {
+        self.link.as_ref()
+    }
+
+    /// The same where a cause with these numbers shakes the table.
+    #[must_use]
+    pub fn shaken_by(mut self, frame: &Frame, law: &Law, shape: &[f64], coefficients: &[f64]) -> Self {
+        let Some(shaking) = law.shakes(frame, shape, coefficients) else { return self };
+        let term = law.terms(frame, &self, &[shape.to_vec()]).swap_remove(0);
+        for (trace, c) in term.regressors.iter().zip(coefficients) {
+            grown(&mut self.sliding.torque, &trace.torque, *c);
+            grown(&mut self.sliding.table, &trace.table, *c);
+        }
+        self.shaking.push(shaking);
+        self
     }
 
     /// That of the same axis with what was found beside what it is believed to have.
     #[must_use]
     pub fn with(&self, frame: &Frame, found: Vec<Effect>) -> Self {
-        Self::of(frame, &belief::with_found(&self.axis, frame.axis, found))
+        let (shaking, sliding) = (self.shaking.clone(), self.sliding.clone());
+        Self { shaking, sliding, ..Self::of(frame, &belief::with_found(&self.axis, frame.axis, found)) }
     }
 
     /// Whether an effect is any of it.
@@ -73,7 +121,18 @@ impl Resistance {
     fn none(frame: &Frame, axis: &Axis) -> Self {
         let none = vec![0.0; frame.x.len()];
         let (level, dry, even) = (none.clone(), none.clone(), none.clone());
-        Self { axis: axis.clone(), level, dry, even, load: none, viscous: 0.0, bristle: None }
+        Self {
+            axis: axis.clone(),
+            link: None,
+            shaking: Vec::new(),
+            sliding: Trace::default(),
+            level,
+            dry,
+            even,
+            load: none,
+            viscous: 0.0,
+            bristle: None,
+        }
     }
 
     fn along(frame: &Frame, axis: &Axis, physics: &Physics) -> Self {
@@ -84,6 +143,9 @@ impl Resistance {
         let bristle = physics.bristle_stiffness().map(|stiffness| (physics.bristle(1.0), stiffness));
         Self {
             axis: axis.clone(),
+            link: None,
+            shaking: Vec::new(),
+            sliding: Trace::default(),
             dry: match bristle {
                 Some((at_rest, _)) => built_up(frame, at_rest, &of_motor, |_, _| 0.0),
                 None => at_once(frame, &of_motor).collect(),
@@ -102,8 +164,18 @@ impl Resistance {
         let all = dot(&self.dry, &self.dry) + dot(&self.load, &self.load);
         (self.viscous - other.viscous).abs() <= ALIKE * self.viscous.abs()
             && self.bristle.is_some() == other.bristle.is_some()
-            && apart(&self.dry, &other.dry) + apart(&self.load, &other.load) <= ALIKE * ALIKE * all
+            && self.shaking.len() == other.shaking.len()
+            && self.shaking.iter().zip(&other.shaking).map(|(own, other)| apart(&own.held, &other.held)).sum::<f64>()
+                + apart(&self.dry, &other.dry)
+                + apart(&self.load, &other.load)
+                <= ALIKE * ALIKE * all
     }
+}
+
+/// Adds so much of some values to others, which may not be there yet.
+fn grown(sum: &mut Vec<f64>, values: &[f64], factor: f64) {
+    sum.resize(values.len(), 0.0);
+    add(sum, factor, values);
 }
 
 /// What resists each of several tables.
@@ -113,6 +185,9 @@ pub(super) trait Resisted<const N: usize>: Copy {
 
     /// A number of each.
     fn each(self, of: impl Fn(&Resistance) -> f64) -> [f64; N];
+
+    /// That of one.
+    fn lane(&self, at: usize) -> &Resistance;
 
     /// How the friction of each builds up, where all does.
     fn bristles(self) -> Option<[(Friction, f64); N]>;
@@ -130,6 +205,10 @@ impl<const N: usize> Resisted<N> for Alike<'_> {
         [of(self.0); N]
     }
 
+    fn lane(&self, _: usize) -> &Resistance {
+        self.0
+    }
+
     fn bristles(self) -> Option<[(Friction, f64); N]> {
         self.0.bristle.map(|bristle| [bristle; N])
     }
@@ -145,6 +224,10 @@ impl<const N: usize> Resisted<N> for Each<'_, N> {
     #[inline(always)]
     fn each(self, of: impl Fn(&Resistance) -> f64) -> [f64; N] {
         lanes(|l| of(self.0[l]))
+    }
+
+    fn lane(&self, at: usize) -> &Resistance {
+        self.0[at]
     }
 
     fn bristles(self) -> Option<[(Friction, f64); N]> {
