@@ -18,7 +18,7 @@ RELEASE := $(TARGET)/$(PROFILE)
 # What a C program outside the tree would find installed: the libraries with their links.
 LIB := build/lib
 
-.PHONY: all build header demo test deps check-format check-lints test-rust test-parquet test-harness linuxcnc-test bench scoreboard install uninstall clean help
+.PHONY: all build header demo test deps check-format check-lints rust-tests test-rust test-parquet test-harness linuxcnc-test bench scoreboard install uninstall clean help
 
 all: build
 
@@ -40,7 +40,9 @@ demo: build ## show what gib does
 	@test ! -e c-harness/Makefile || $(MAKE) -s -C c-harness all
 	@GIB=$(RELEASE)/gib tools/demo
 
-test: deps check-format build check-lints test-rust test-harness linuxcnc-test ## everything that must hold
+test: deps check-format ## everything that must hold
+	@$(MAKE) -s -j2 --output-sync build rust-tests
+	@$(MAKE) -s test-rust test-harness linuxcnc-test
 	@echo "make test: all passed"
 
 deps: ## install the Debian packages that the tests need
@@ -55,6 +57,10 @@ CLIPPY := $(shell $(CARGO) clippy --version 2>/dev/null)
 check-lints:
 	@if [ -n "$(CLIPPY)" ]; then $(CARGO) clippy -q --all-targets $(if $(findstring clippy 0.1.95,$(CLIPPY)),-- -D warnings); \
 	else echo "check-lints: skipped, no clippy"; fi
+
+# The compiler is one thread for much of the time: beside the libraries the tests are built.
+rust-tests: check-lints
+	$(CARGO) test --no-run
 
 test-rust:
 	GIB_RELEASE=$(RELEASE) $(CARGO) test

@@ -1,7 +1,8 @@
 #!/bin/sh
 # The harness under AddressSanitizer and UBSan, library included, and under valgrind's memcheck.
 #
-#   checked_memory.sh sanitizers TEST...     names of test programs, without .c; HELPERS: names of what they share
+#   checked_memory.sh library                builds the library for the next, if it can
+#   checked_memory.sh sanitizers TEST...     names of test programs, without .c; HELPERS: names of what they share; 3 where it cannot
 #   checked_memory.sh memcheck PROGRAM...    programs that are built already
 #   checked_memory.sh sanitized TEST         one test of the first, which calls itself so, several at a time
 #
@@ -14,7 +15,11 @@ kind=$1
 shift
 mkdir -p "$out"
 
-skip() { echo "checked_memory: $kind skipped, $1"; exit 0; }
+skip() {
+    test "$kind" = library || echo "checked_memory: $kind skipped, $1"
+    test "$kind" != sanitizers || exit 3
+    exit 0
+}
 
 # caught COMMAND...: it must fail
 caught() {
@@ -55,7 +60,7 @@ if [ "$kind" = sanitized ]; then
     exit 0
 fi
 
-[ $# -gt 0 ] || skip "no tests"
+[ $# -gt 0 ] || [ "$kind" = library ] || skip "no tests"
 command -v clang >/dev/null || skip "no clang"
 [ "$(uname -sm)" = "Linux x86_64" ] || skip "set up for Linux on x86_64 only"
 echo 'int main(void) { return 0; }' >"$out/empty.c"
@@ -64,12 +69,13 @@ clang $flags "$out/empty.c" -o "$out/empty" 2>/dev/null || skip "clang has no sa
 # Only the library, and only what changed since the last time. The switch is for compilers of developers, hence the
 # variable that says so; a compiler that still refuses it is named.
 if ! RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Zsanitizer=address -Cdebug-assertions=on -Coverflow-checks=on" \
-    CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 CARGO_TARGET_DIR="$root/build/asan" ${CARGO:-cargo} build -q \
+    CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 CARGO_PROFILE_RELEASE_OPT_LEVEL=1 CARGO_TARGET_DIR="$root/build/asan" ${CARGO:-cargo} build -q \
     --manifest-path "$root/Cargo.toml" --lib --release --target $target 2>"$out/cargo.log"; then
     grep -q 'sanitizer' "$out/cargo.log" && skip "the Rust compiler has no sanitizers"
     cat "$out/cargo.log" >&2
     exit 1
 fi
+[ "$kind" = sanitizers ] || exit 0
 rm -f "$out/helpers.a"
 for helper in $HELPERS; do
     clang $flags -c "$helper.c" -o "$out/$helper.o"

@@ -36,7 +36,7 @@ static void count(adversary_tally *t)
 int main(int argc, char **argv)
 {
     const adversary_test test = {
-        .known_seed = 20260101, .known_runs = 2000, .fresh_runs = 100,
+        .known_seed = 20260101, .known_runs = FEWER(2000), .fresh_runs = 100,
         .least_met = 0.5, .least_ended = 0.1,
         .run = run, .count = count, .describe = describe,
     };

@@ -42,7 +42,7 @@ static const char *const LAWS[VARIATION_MISTAKES] = {
 int main(int argc, char **argv)
 {
     const adversary_test test = {
-        .known_seed = 20260400, .known_runs = 2000, .fresh_runs = 20,
+        .known_seed = 20260400, .known_runs = FEWER(2000), .fresh_runs = 20,
         .least_met = 1.0, .least_ended = 0.1,
         .mistakes = VARIATION_MISTAKES, .mistaken_runs = 100, .least = 5, .laws = LAWS,
         .run = run, .count = count, .describe = describe,
