@@ -4,7 +4,7 @@ use super::frame::Columns;
 use crate::plant::noise::Noise;
 use std::ops::Range;
 
-/// Most rows on which causes are compared; more are thinned evenly, which costs time and gains nothing.
+/// Most rows on which causes are compared; more cost time and gain nothing.
 const MOST_KEPT: usize = 12_000;
 /// Of how many and more one is taken unevenly.
 const UNEVEN: usize = 3;
