@@ -132,13 +132,16 @@ const PLAIN: Manner = Manner {
     taken: &[],
 };
 
+/// Traces by what is between motor and table.
+type TermsBehind = fn(&Frame, Option<&TwoMasses>, &[Vec<f64>]) -> Vec<Term>;
+
 /// How traces are come by, one for each set of non-linear parameters.
 pub enum Terms {
     /// Worked out row by row.
     ByRows(fn(&Frame, &[Vec<f64>]) -> Vec<Term>),
     /// The same, by what the axis has between motor and table, of what shakes the table; and how it does by non-linear parameters and
     /// coefficients.
-    Shaking(fn(&Frame, Option<&TwoMasses>, &[Vec<f64>]) -> Vec<Term>, fn(&Frame, &[f64], &[f64]) -> Option<Shaking>),
+    Shaking(TermsBehind, fn(&Frame, &[f64], &[f64]) -> Option<Shaking>),
     /// Simulated between the rows under what resists the table: an effect that parts it from the motor, by its non-linear parameters.
     Simulated(fn(&Frame, &[f64]) -> Option<Effect>),
 }
