@@ -23,6 +23,28 @@ struct Source<'a> {
     factor: f64,
 }
 
+#[cfg(test)]
+impl Columns {
+    /// Rows every millisecond in one stretch, all of them known, by a position and a torque alone.
+    pub fn every_millisecond(position: Vec<f64>, torque: Vec<f64>) -> Columns {
+        Columns {
+            time_s: (0..position.len()).map(|row| row as f64 * 1e-3).collect(),
+            known: vec![true; position.len()],
+            stretches: std::iter::once(0..position.len()).collect(),
+            position,
+            torque,
+            command: None,
+            table: None,
+            torque_step: 0.0,
+            position_grid: 0.0,
+            table_grid: 0.0,
+            period_s: 1e-3,
+            recorded_period_s: 1e-3,
+            left_out: 0,
+        }
+    }
+}
+
 impl Columns {
     /// The columns of an axis.
     ///
@@ -326,19 +348,9 @@ mod tests {
     fn no_loop_is_replayed_across_rows_that_were_left_out() {
         let rows: Vec<f64> = (0..4000).map(|i| f64::from(i) * 1e-3).collect();
         let whole = Columns {
-            time_s: rows.clone(),
-            position: rows.clone(),
-            torque: rows.clone(),
-            known: vec![true; rows.len()],
-            command: Some(rows),
-            table: None,
+            command: Some(rows.clone()),
             stretches: vec![0..2000, 2000..4000],
-            torque_step: 0.0,
-            position_grid: 0.0,
-            table_grid: 0.0,
-            period_s: 1e-3,
-            recorded_period_s: 1e-3,
-            left_out: 0,
+            ..Columns::every_millisecond(rows.clone(), rows)
         };
         assert!(whole.observed().unwrap().command.is_some());
         assert!(Columns { left_out: 1, ..whole }.observed().unwrap().command.is_none());

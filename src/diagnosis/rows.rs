@@ -142,21 +142,7 @@ mod tests {
     #[test]
     fn rows_of_a_long_recording_are_one_of_several_and_show_fast_waves() {
         let rows = 200_000;
-        let columns = Columns {
-            time_s: vec![0.0; rows],
-            position: (0..rows).map(|row| row as f64).collect(),
-            torque: vec![0.0; rows],
-            known: vec![true; rows],
-            command: None,
-            table: None,
-            stretches: vec![0..rows],
-            torque_step: 0.0,
-            position_grid: 0.0,
-            table_grid: 0.0,
-            period_s: 1e-3,
-            recorded_period_s: 1e-3,
-            left_out: 0,
-        };
+        let columns = Columns::every_millisecond((0..rows).map(|row| row as f64).collect(), vec![0.0; rows]);
         let Judged { rows: kept, apart } = judged_rows(&columns, 10, 2, |_| true);
         let gaps: Vec<usize> = kept.windows(2).map(|w| w[1] - w[0]).collect();
         assert!(kept.len() <= MOST_KEPT && apart == [18, 34], "{} {apart:?}", kept.len());

@@ -417,21 +417,7 @@ mod tests {
     fn soft_flanks_with_hardly_any_play_are_a_spring() {
         let axis = Machine::parse(include_str!("../../../examples/machines/believed.json")).unwrap().axes.remove(0);
         let rows: Vec<f64> = (0..2000).map(|i| (f64::from(i) * 1e-3 * 3.0).sin()).collect();
-        let columns = Columns {
-            time_s: (0..2000).map(|i| f64::from(i) * 1e-3).collect(),
-            position: rows.clone(),
-            torque: rows,
-            known: vec![true; 2000],
-            command: None,
-            table: None,
-            stretches: vec![0..2000],
-            torque_step: 0.0,
-            position_grid: 0.0,
-            table_grid: 0.0,
-            period_s: 1e-3,
-            recorded_period_s: 1e-3,
-            left_out: 0,
-        };
+        let columns = Columns::every_millisecond(rows.clone(), rows);
         let base = base_alone(&axis);
         let frame = Frame::new(&base, &columns, None);
         let flanks = |width_um: f64, contact_hz: f64| Trial {

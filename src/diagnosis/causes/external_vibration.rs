@@ -91,23 +91,9 @@ mod tests {
         };
         let behind = axis.with_effects(vec![spring]);
         let still = 4.0;
-        let time_s: Vec<f64> = (0..8000).map(|i| f64::from(i) * 1e-3).collect();
-        let position: Vec<f64> = time_s.iter().map(|t| 20.0 + 30.0 * t.min(still)).collect();
-        let columns = Columns {
-            torque: vec![0.0; position.len()],
-            known: vec![true; position.len()],
-            stretches: vec![0..position.len()],
-            table: Some(position.clone()),
-            time_s,
-            position,
-            command: None,
-            torque_step: 0.0,
-            position_grid: 0.0,
-            table_grid: 0.0,
-            period_s: 1e-3,
-            recorded_period_s: 1e-3,
-            left_out: 0,
-        };
+        let position: Vec<f64> = (0..8000).map(|i| 20.0 + 30.0 * (f64::from(i) * 1e-3).min(still)).collect();
+        let torque = vec![0.0; position.len()];
+        let columns = Columns { table: Some(position.clone()), ..Columns::every_millisecond(position, torque) };
         let mut frame = Frame::new(&axis, &columns, Some(3));
         // All rows, at rest as well.
         frame.kept = (100..7900).collect();

@@ -201,24 +201,9 @@ mod tests {
         let time: Vec<f64> = (0..rows).map(|i| f64::from(i) * 1e-3).collect();
         let position: Vec<f64> =
             time.iter().map(|t| (1.37 * (1.0 - ((t % 4.0) - 2.0).abs() / 2.0) / grid).round() * grid).collect();
-        Columns {
-            torque: {
-                let mut noise = Noise::new(1);
-                position.iter().map(|_| noise.normal(0.1)).collect()
-            },
-            known: vec![true; position.len()],
-            stretches: vec![0..position.len()],
-            time_s: time,
-            position,
-            command: None,
-            table: None,
-            torque_step: 0.0,
-            position_grid: grid,
-            table_grid: 0.0,
-            period_s: 1e-3,
-            recorded_period_s: 1e-3,
-            left_out: 0,
-        }
+        let mut noise = Noise::new(1);
+        let torque = position.iter().map(|_| noise.normal(0.1)).collect();
+        Columns { position_grid: grid, ..Columns::every_millisecond(position, torque) }
     }
 
     #[test]
