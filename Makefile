@@ -41,7 +41,7 @@ demo: build ## show what gib does
 	@GIB=$(RELEASE)/gib tools/demo
 
 test: deps check-format ## everything that must hold
-	@$(MAKE) -s -j2 --output-sync build rust-tests
+	@$(MAKE) -s -j2 build rust-tests
 	@$(MAKE) -s test-rust test-harness linuxcnc-test
 	@echo "make test: all passed"
 

@@ -68,16 +68,17 @@ impl Known {
         for effect in periodic {
             let Some((shape, coefficients)) = by_its_law(frame, effect) else { continue };
             if let ([sine, cosine], [amplitude]) =
-                (known.regressors(frame, effect, shape).as_slice(), coefficients.as_slice())
+                (known.regressors(frame, effect, shape.clone()).as_slice(), coefficients.as_slice())
             {
                 let (a, b) = phase(frame, &known.trace, sine, cosine);
                 let amplitude = amplitude * belief::felt(axis, effect);
                 known.add(frame, &[(sine, amplitude * a), (cosine, amplitude * b)], [LAW_HOLDS; 2]);
-                let shape = by_its_law(frame, effect).map(|(shape, _)| shape);
-                shaking.extend(shape.map(|shape| (law(effect.cause()), shape, [amplitude * a, amplitude * b])));
+                if law(effect.cause()).is_shaking() {
+                    shaking.push((law(effect.cause()), shape, [amplitude * a, amplitude * b]));
+                }
             }
         }
-        if let Some(apart) = &apart {
+        if let (Some(apart), false) = (&apart, shaking.is_empty()) {
             known.shake(frame, axis, apart, &shaking);
         }
         known
@@ -88,9 +89,6 @@ impl Known {
         let shaken =
             |under: Resistance, (law, shape, c): &(&Law, Vec<f64>, [f64; 2])| under.shaken_by(frame, law, shape, c);
         let resistance = shaking.iter().fold((*self.resistance).clone(), shaken);
-        if resistance == *self.resistance {
-            return;
-        }
         if let Some(trace) = table_side::believed(frame, axis, &resistance) {
             for (sum, now, before) in [
                 (&mut self.trace.torque, &trace.torque, &apart.torque),

@@ -107,7 +107,7 @@ pub fn beside_filled(columns: &Columns, margin: usize) -> Vec<bool> {
 }
 
 /// Rows that are judged.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Judged {
     /// Which.
     pub rows: Vec<usize>,

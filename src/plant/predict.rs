@@ -94,7 +94,7 @@ impl Shown {
 
 /// Whether vibrations shake a table that is set apart from its motor: it swings under them as it slides, and rests as friction holds it.
 fn shakes_a_table(physics: &Physics) -> bool {
-    physics.two_masses.is_some() && !physics.vibration.is_empty()
+    physics.two_masses.is_some() && physics.vibration.iter().any(|ripple| ripple.amplitude != 0.0)
 }
 
 /// Torque that the motor must deliver, without ripples but with what shakes a table that is set apart; NaN where the motion is not known.

@@ -18,8 +18,7 @@ pub static LAW: Law = Law {
             each(shapes, |shape| {
                 let per_second = shape[0] / duration(frame);
                 let (sine, cosine) = waves(frame, per_second, 0.0);
-                let seen = link.filter(|_| frame.columns.table.is_some());
-                let swings = seen.map(|link| swings(frame, link, TAU * per_second, [&sine, &cosine]));
+                let swings = link.map(|link| swings(frame, link, TAU * per_second, [&sine, &cosine]));
                 let held = [sine, cosine].map(|wave| frame.judged_instants(&wave));
                 let trace = |(torque, table)| Trace { torque, table };
                 Term { fixed: None, regressors: held.into_iter().zip(swings.unwrap_or_default()).map(trace).collect() }

@@ -139,7 +139,7 @@ type TermsBehind = fn(&Frame, Option<&TwoMasses>, &[Vec<f64>]) -> Vec<Term>;
 pub enum Terms {
     /// Worked out row by row.
     ByRows(fn(&Frame, &[Vec<f64>]) -> Vec<Term>),
-    /// The same, by what the axis has between motor and table, of what shakes the table; and how it does by non-linear parameters and
+    /// The same, by what the axis has between motor and table where a scale shows it, of what shakes the table; and how it does by non-linear parameters and
     /// coefficients.
     Shaking(TermsBehind, fn(&Frame, &[f64], &[f64]) -> Option<Shaking>),
     /// Simulated between the rows under what resists the table: an effect that parts it from the motor, by its non-linear parameters.

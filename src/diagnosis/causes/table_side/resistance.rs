@@ -18,7 +18,7 @@ const ALIKE: f64 = 3e-4;
 pub struct Resistance {
     /// The axis that has it.
     axis: Axis,
-    /// What that has between motor and table.
+    /// What that has between motor and table, where a scale shows it.
     link: Option<TwoMasses>,
     /// What shakes a table behind a spring.
     pub(super) shaking: Vec<Shaking>,
@@ -64,7 +64,7 @@ impl Resistance {
     /// That of an axis, whatever it has between motor and table.
     #[must_use]
     pub fn of(frame: &Frame, axis: &Axis) -> Self {
-        let link = axis.two_masses().ok().flatten();
+        let link = frame.columns.table.as_ref().and_then(|_| axis.two_masses().ok()?);
         let resisting = axis.with_effects(axis.effects.iter().filter(|e| Self::has(e)).copied().collect());
         // What lies between motor and table is all that an axis may contradict itself in.
         match Physics::of(&resisting) {
@@ -73,7 +73,7 @@ impl Resistance {
         }
     }
 
-    /// What the axis has between motor and table.
+    /// What the axis has between motor and table, where a scale shows it.
     #[must_use]
     pub fn link(&self) -> Option<&TwoMasses> {
         self.link.as_ref()
