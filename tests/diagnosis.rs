@@ -337,6 +337,19 @@ fn what_the_hold_out_contradicts_is_not_named() {
     assert!(d.notes.iter().any(said), "{:?}", d.notes);
 }
 
+/// Without a servo block nobody knows that the torque column is half a row late, in either recording.
+#[test]
+fn what_the_sampling_makes_late_is_late_on_the_hold_out_too() {
+    let heavy = Machine::parse(&MACHINE.replace("0.003", "0.3")).unwrap().axes.remove(0);
+    let (w1, w2) = (TAU * 0.21, TAU * 0.57);
+    let acceleration = |t: f64| -60.0 * w1 * w1 * (w1 * t).sin() - 12.0 * w2 * w2 * (w2 * t).sin();
+    let late = recording(|t, _, _, a| (0.3 * acceleration(t - 0.5e-3) - 0.003 * a) * TAU / 10.0);
+    let excerpt = Excerpt::of(&late, &heavy);
+    let d = diagnose(&heavy, &excerpt, Some(&excerpt), &|_, _| true).unwrap();
+    assert_eq!(d.verdict, Verdict::NoDiscrepancy, "{:?}", d.notes);
+    assert!(d.notes.iter().any(|note| note.contains("late against the position column")), "{:?}", d.notes);
+}
+
 #[test]
 fn what_acts_on_the_hold_out_alone_is_unknown_there() {
     let clean = recording(|_, _, _, _| 0.0);

@@ -14,7 +14,7 @@ mod sharper;
 mod trial;
 
 pub(super) use itself::settled;
-pub(super) use replays::{Over, mean, mean_of_worse_half, misses, strength};
+pub(super) use replays::{Over, mean, misses, strength};
 pub(super) use sharper::sharpened;
 
 use super::belief;
@@ -39,14 +39,15 @@ use itself::Itself;
 use replays::{NOTHING, Replays, avoidable};
 use trial::{Refined, Trial, starts};
 
-/// Misses from which on the loop has something to say: half of the blocks are missed, in the geometric mean, by more than twice what the
-/// encoder itself is off by.
-pub(super) const MUCH: f64 = 0.9;
+/// A miss that the loop has something to say of: of more than twice what the encoder itself is off by.
+const MUCH: f64 = 0.9;
+/// And in how many blocks of either half: an axis that sticks may break loose another way in a moment or two.
+const FEWEST: usize = 3;
 /// Share of the misses beyond that which a cause must explain in rows that gave none of its numbers.
 const LEAST_EXPLAINED: f64 = 0.4;
 /// The same where the torque is left with much that no cause explains.
 const MOSTLY: f64 = 0.6;
-/// Mean over scatter of what it gains in each block, times √blocks.
+/// Mean over scatter of what it gains in each block, times √blocks, as many as there are ([`strength`]).
 const SURELY: f64 = 3.0;
 /// Share of the best cause's gain from which on another one is not told from it, and may itself be the one.
 const ALIKE: f64 = 0.8;
@@ -134,9 +135,10 @@ fn answered(
     Ok(Some(Diagnosis { verdict: told.verdict, gains, unexplained, extended, ..stays }))
 }
 
-/// Whether the loop has something to say.
-fn is_much(misses: &[f64]) -> bool {
-    mean_of_worse_half(misses, GIVES).min(mean_of_worse_half(misses, JUDGES)) >= MUCH
+/// Whether the loop has something to say, by how far each block is missed.
+pub(super) fn is_much(misses: &[f64]) -> bool {
+    let missed = |half: Over| misses.iter().enumerate().filter(|(block, miss)| half.has(*block) && **miss >= MUCH).count();
+    missed(GIVES).min(missed(JUDGES)) >= FEWEST
 }
 
 /// What the loop tells.
@@ -376,7 +378,7 @@ mod tests {
     fn a_loop_that_rests_most_of_the_time_is_asked_and_one_that_misses_in_moments_is_not() {
         let missed =
             |every: usize| (0..BLOCKS).map(|i| if i / 2 % every == 0 { 2.5 } else { NOTHING }).collect::<Vec<_>>();
-        assert!(is_much(&missed(3)) && !is_much(&missed(8)) && !is_much(&[NOTHING; BLOCKS]));
+        assert!(is_much(&missed(8)) && !is_much(&missed(12)) && !is_much(&[NOTHING; BLOCKS]));
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::frame::{Columns, Frame};
 use super::gain::{Gain, errors, of_both, weight_of_rows};
 use super::judge::{Excess, TOLERABLE_IF_UNTIED};
 use super::progress::{Stopped, Watch};
+use super::sampling::{Sampling, Timing};
 use super::verdict::{Verdict, what_is_missing};
 use crate::machine::Axis;
 use crate::plant::added::ByServo;
@@ -42,9 +43,10 @@ impl Holdout {
     }
 
     /// An answer beside what its machine leaves here, and a note of it, where that is far above the noise. It is meant for a machine
-    /// that takes nothing off what the belief leaves: something then acts here that does not act in the recording.
+    /// that takes nothing off what the belief leaves: something then acts here that does not act in the recording. By what the
+    /// recording was found to be late by its sampling this one is, too.
     #[must_use]
-    pub fn beside_more(&self, verdict: Verdict, extended: &Axis) -> Option<(Verdict, String)> {
+    pub fn beside_more(&self, verdict: Verdict, extended: &Axis, sampling: Sampling) -> Option<(Verdict, String)> {
         let verdict = match verdict {
             Verdict::NoDiscrepancy => Verdict::UnknownCause,
             Verdict::Explained => Verdict::PartlyExplained,
@@ -52,6 +54,7 @@ impl Holdout {
         };
         let base = belief::base_alone(extended);
         let frame = Frame::new(&base, &self.thinned, None);
+        let frame = if sampling.timing == Timing::Aligned { frame.aligned_by(sampling.shift_s) } else { frame };
         let masses = extended.two_masses().unwrap_or_default();
         let frame = masses.iter().fold(frame, Frame::after_first_swings);
         if !what_is_missing(&frame).is_empty() {

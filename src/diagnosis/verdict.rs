@@ -286,7 +286,7 @@ fn answer_on(
                     (findings, extended) = (Vec::new(), axis.clone());
                     [judged.gains, _] = rows.gains(axis, axis, watch)?;
                 } else if !shows(&in_judged_rows) {
-                    if let Some((verdict, note)) = rows.beside_more(judged.verdict, &extended) {
+                    if let Some((verdict, note)) = rows.beside_more(judged.verdict, &extended, frame.sampling) {
                         judged.verdict = verdict;
                         notes.push(note);
                     }

@@ -4,6 +4,7 @@ use super::STAGE;
 use crate::analysis::statistics;
 use crate::diagnosis::gain::{Replay, half_of};
 use crate::diagnosis::progress::Watch;
+use crate::diagnosis::uncertainty::widening;
 use crate::machine::Axis;
 use crate::plant::added::ByServo;
 use crate::plant::closed_loop::{Part, rows_of_the_beginning};
@@ -16,6 +17,8 @@ use std::ops::Range;
 pub const BLOCKS: usize = 48;
 /// The miss of a block by no more than the encoder itself is off by.
 pub const NOTHING: f64 = 0.35;
+/// What is hardly missed, over what is missed most.
+const HARDLY: f64 = 0.1;
 /// Most plant steps of a replay: 40 s at the usual ones. Longer steps are no help, they put impacts elsewhere.
 const MOST_STEPS: usize = 1_600_000;
 /// The same where causes are tried that may not be worth it.
@@ -212,14 +215,18 @@ pub fn mean_of_worse_half(of_blocks: &[f64], over: Over) -> f64 {
 }
 
 /// Mean over scatter, times √blocks, of the share that is gained of what is missed in each block, over that half of some blocks which was
-/// missed most.
+/// missed most, but for those that were hardly missed beside the worst: an axis that rests gains nothing by any law. By fewer blocks the
+/// scatter is known less, and it is less by as much as Student's distribution is wider.
 #[must_use]
 pub fn strength(gained: &[f64], misses: &[f64], over: Over) -> f64 {
     let mut judging: Vec<usize> = (0..BLOCKS).filter(|block| over.has(*block)).collect();
     judging.sort_by(|a, b| misses[*b].total_cmp(&misses[*a]));
     judging.truncate(judging.len().div_ceil(2));
-    let share = |&block: &usize| (gained[block] / (misses[block] - NOTHING).max(NOTHING)).clamp(-1.0, 1.0);
-    statistics::strength(&judging.iter().map(share).collect::<Vec<_>>())
+    let beyond = |block: usize| misses[block] - NOTHING;
+    let hardly = HARDLY * judging.first().map_or(0.0, |worst| beyond(*worst));
+    judging.retain(|block| beyond(*block) >= hardly);
+    let share = |&block: &usize| (gained[block] / beyond(block).max(NOTHING)).clamp(-1.0, 1.0);
+    statistics::strength(&judging.iter().map(share).collect::<Vec<_>>()) / widening(judging.len() as f64 - 1.0)
 }
 
 /// Which rows are not of a long rest: where within its friction an axis came to rest is partly chance, and that is not to count over and

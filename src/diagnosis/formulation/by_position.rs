@@ -4,7 +4,7 @@
 
 use super::{OWN_STEPS, place};
 use crate::analysis::statistics;
-use crate::diagnosis::by_loop::{MUCH, Over, mean, mean_of_worse_half, misses, strength};
+use crate::diagnosis::by_loop::{Over, is_much, mean, misses, strength};
 use crate::diagnosis::causes::law;
 use crate::diagnosis::causes::presliding_friction::{BRISTLE, ELEMENTS_AS_BRISTLE, OF_ANY_EXPONENT};
 use crate::diagnosis::fit::{Bench, Fit};
@@ -37,7 +37,7 @@ pub fn told(
         let floor = statistics::reading_error(position);
         (floor > 0.0).then(|| misses(error, floor))
     };
-    let before = missed(errors).filter(|before| mean_of_worse_half(before, Over::All) >= MUCH);
+    let before = missed(errors).filter(|before| is_much(before));
     let Some(before) = before else { return Ok(None) };
     let mut others = fit.parts.clone();
     let shape = others.remove(at).shape;
