@@ -79,8 +79,7 @@ pub fn completed(
     // their numbers are off by, for which another stands in.
     let doubtful: Vec<Cause> =
         found.findings.iter().map(|finding| finding.effect).filter(about).map(|effect| effect.cause()).collect();
-    let open = matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained | Verdict::UnknownCause);
-    let silent = !open || axis.effects.iter().any(about) || doubtful.len() > 1;
+    let silent = axis.effects.iter().any(about) || doubtful.len() > 1;
     let Some(known) = found.replay.as_ref().filter(|_| !silent) else { return Ok(found) };
     let at_first = misses(&known.error, statistics::reading_error(&whole.position));
     let much = is_much(&at_first);
