@@ -22,9 +22,12 @@ use crate::plant::closed_loop::{Part, rows_of_the_beginning};
 use crate::plant::linear::{decomposed, rms};
 use crate::plant::observed::Observed;
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
-/// Contiguous blocks by which the position's word is judged.
+/// Contiguous blocks by which the position's word is judged, what one of them may hold of what is told, and rows that are not cut.
 const BLOCKS: usize = 24;
+const MOST_IN_A_BLOCK: f64 = 0.5;
+const FEWEST_ROWS: usize = 32;
 /// How much of a recording is replayed at most, s, and plant steps of that, of a rigid axis and of two masses, which take three times
 /// as long for one.
 const MOST_S: f64 = 40.0;
@@ -336,9 +339,9 @@ impl Says {
         if self.squares[i] <= LEAST {
             return f64::INFINITY;
         }
-        let length = left.len().div_ceil(BLOCKS).max(1);
         let (mut sum, mut sum_of_shares, mut blocks) = (0.0, 0.0, 0.0);
-        for (column, left) in self.along[i].chunks(length).zip(left.chunks(length)) {
+        for rows in blocks_of(&self.along[i], MOST_IN_A_BLOCK * self.squares[i]) {
+            let (column, left) = (&self.along[i][rows.clone()], &left[rows]);
             let share = dot(column, column) / self.squares[i];
             // A block that alone knows of something cannot be left out; a twentieth of it stays.
             let moved = dot(column, left) / self.squares[i] / (1.0 - 0.95 * share);
@@ -348,6 +351,25 @@ impl Says {
         }
         (SIMULATED * widening(1.0 / sum_of_shares)).powi(2) * (blocks - 1.0) / blocks * sum
     }
+}
+
+/// Contiguous blocks of a column. One that holds more than `most` of its squares is cut in two: what a single block tells fits it by
+/// itself, and by nothing that it leaves would anybody see how sure that is.
+fn blocks_of(column: &[f64], most: f64) -> Vec<Range<usize>> {
+    let length = column.len().div_ceil(BLOCKS).max(1);
+    let mut open: Vec<Range<usize>> =
+        (0..column.len()).step_by(length).map(|from| from..(from + length).min(column.len())).collect();
+    let mut blocks = Vec::with_capacity(open.len());
+    while let Some(rows) = open.pop() {
+        let held = dot(&column[rows.clone()], &column[rows.clone()]);
+        if held > most && rows.len() >= 2 * FEWEST_ROWS {
+            let middle = rows.start.midpoint(rows.end);
+            open.extend([rows.start..middle, middle..rows.end]);
+        } else {
+            blocks.push(rows);
+        }
+    }
+    blocks
 }
 
 /// Squares below which there is nothing, as where a cause does not move the motor at all.
