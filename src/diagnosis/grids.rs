@@ -6,7 +6,7 @@
 //! they were passed, |Σ c·e^(2πi·k·x/g)|: little where they fall evenly on the grid, all of g/π where they beat with the trace.
 //! Noise σ on the reading takes e^(−2π²·k²·σ²/g²) off it (Widrow and Kollár 2008).
 
-use super::filter::LowPass;
+use super::filter::{LowPass, convolve, norm};
 use super::fit::{Bench, Fit, orthonormal};
 use super::frame::{Columns, Frame};
 use super::many::{add, dot, sines_and_cosines};
@@ -52,8 +52,16 @@ fn through_inertia(frame: &Frame) -> Vec<f64> {
     made
 }
 
-/// By how much the torque column may seem early or late by the encoder's grid, s. The servo answers to the grid's error e with
-/// −Kv·ė, whose slope goes with the J·ë that the balance has of it: Kv/J·mean (J·ë)² over mean Ṫ². 0 without a servo.
+/// Mean square of what readings that are off each by itself make there.
+fn of_readings_through_inertia(frame: &Frame) -> f64 {
+    let per = frame.belief.inertia * frame.unit / frame.columns.period_s.powi(2);
+    let bends = convolve(&frame.low_pass.kernel(), &[1.0, -2.0, 1.0]);
+    (per * statistics::reading_error(&frame.columns.position) * norm(&bends)).powi(2)
+}
+
+/// By how much the torque column may seem early by what the encoder is off by, s. The servo answers to that error e with −Kv·ė,
+/// whose slope goes with the J·ë that the balance has of it: Kv/J·mean (J·ë)² over mean Ṫ², where e is the grid's as rows beat with
+/// it, or what a reading is off by from row to row, whichever makes more. 0 without a servo.
 #[must_use]
 pub fn delay_s(frame: &Frame) -> f64 {
     let Some(servo) = &frame.axis.servo else { return 0.0 };
@@ -61,7 +69,8 @@ pub fn delay_s(frame: &Frame) -> f64 {
     let (after, before) = (frame.torque(half), frame.torque(-half));
     let sides = after.iter().zip(&before).zip(&frame.weights);
     let slope: Vec<f64> = sides.map(|((after, before), weight)| weight * (after - before) / (2.0 * half)).collect();
-    servo.velocity_gain / frame.belief.inertia * mean_square(&through_inertia(frame)) / mean_square(&slope).max(1e-300)
+    let made = mean_square(&through_inertia(frame)).max(of_readings_through_inertia(frame));
+    servo.velocity_gain / frame.belief.inertia * made / mean_square(&slope).max(1e-300)
 }
 
 /// What the grids of encoder and scale make in table − encoder, RMS over the judged rows, load units; 0 without a scale. It
@@ -138,7 +147,7 @@ fn imitated_torque(bench: &Bench, fit: &Fit) -> Option<usize> {
     })
 }
 
-/// A delay that is no longer than what the encoder's grid makes of itself under the servo, which goes with the square of that error.
+/// A delay that is no longer than what the encoder makes of itself under the servo, which goes with the square of that error.
 fn imitated_delay(bench: &Bench, fit: &Fit) -> Option<usize> {
     let part = fit.parts.iter().position(|part| part.law.cause == Cause::DeadTime)?;
     (1e-3 * fit.parts[part].shape[0].abs() < SURELY * SURELY * delay_s(bench.frame)).then_some(part)
