@@ -350,6 +350,50 @@ fn what_the_sampling_makes_late_is_late_on_the_hold_out_too() {
     assert!(d.notes.iter().any(|note| note.contains("late against the position column")), "{:?}", d.notes);
 }
 
+/// A servo answers what its encoder is off by from row to row, and what it then asks for seems early.
+#[test]
+fn what_a_servo_makes_of_its_encoders_noise_is_no_delay() {
+    const VELOCITY_GAIN: f64 = 0.4;
+    let servo =
+        r#""constant_torque_nm":0.1,"servo":{"period_s":0.001,"position_gain_1_s":40,"velocity_gain_nm_s":0.4}"#;
+    let axis = Machine::parse(&MACHINE.replace(r#""constant_torque_nm":0.1"#, servo)).unwrap().axes.remove(0);
+    let mut noisy = recording(|_, _, _, _| 0.0);
+    let mut noise = noise(1);
+    let mut before = 0.0;
+    let [position, torque] = noisy.columns.as_mut_slice() else { panic!() };
+    for (x, torque) in position.values.iter_mut().zip(&mut torque.values) {
+        let off = 1e-3 * noise();
+        *x = ((*x + off) * 1e5).round() / 1e5;
+        *torque -= VELOCITY_GAIN * (off - before) / 1e-3 * TAU / 10.0;
+        before = off;
+    }
+    let named: Vec<Cause> = judged_by(&axis, &noisy).findings.iter().map(|finding| finding.effect.cause()).collect();
+    assert!(!named.contains(&Cause::DeadTime), "{named:?}");
+}
+
+/// A vibration of which nobody knows within half a row when its torque was read is known no better than that, however quiet the rows are.
+#[test]
+fn an_amplitude_is_no_surer_than_the_sampling_of_its_torque() {
+    let shakes = |late_s: f64| {
+        // The motor holds a part of what disturbs the axis, which gives way to the rest.
+        let omega = TAU * 60.0;
+        let swing_mm = 0.1 / (0.003 * omega * omega) / (TAU / 10.0);
+        let mut shaken = recording(|t, _, _, _| 0.2 * (omega * (t - late_s)).sin());
+        for (t, x) in shaken.time_s.iter().zip(&mut shaken.columns[0].values) {
+            *x += swing_mm * (omega * t + 0.9).sin();
+        }
+        judged(&shaken)
+    };
+    let told = [0.0, 0.4e-3].map(|late_s| {
+        let d = shakes(late_s);
+        let [finding] = d.findings.as_slice() else { panic!("{d:?}") };
+        assert_eq!(finding.effect.cause(), Cause::ExternalVibration);
+        (finding.effect.values()[1], finding.deviations[1])
+    });
+    let [(one, std), (other, _)] = told;
+    assert!((one - other).abs() > 0.005 && (one - other).abs() < 2.0 * std && std < 0.02, "{told:?}");
+}
+
 #[test]
 fn what_acts_on_the_hold_out_alone_is_unknown_there() {
     let clean = recording(|_, _, _, _| 0.0);

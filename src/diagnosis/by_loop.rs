@@ -136,7 +136,8 @@ fn answered(
 
 /// Whether the loop has something to say, by how far each block is missed.
 pub(super) fn is_much(misses: &[f64]) -> bool {
-    let missed = |half: Over| misses.iter().enumerate().filter(|(block, miss)| half.has(*block) && **miss >= MUCH).count();
+    let missed =
+        |half: Over| misses.iter().enumerate().filter(|(block, miss)| half.has(*block) && **miss >= MUCH).count();
     missed(GIVES).min(missed(JUDGES)) >= FEWEST
 }
 
@@ -378,6 +379,19 @@ mod tests {
         let missed =
             |every: usize| (0..BLOCKS).map(|i| if i / 2 % every == 0 { 2.5 } else { NOTHING }).collect::<Vec<_>>();
         assert!(is_much(&missed(8)) && !is_much(&missed(12)) && !is_much(&[NOTHING; BLOCKS]));
+    }
+
+    /// A move in each of four blocks, and rests between: what such an axis shows it shows there.
+    #[test]
+    fn blocks_in_which_an_axis_rests_speak_against_no_cause() {
+        let moves: Vec<usize> = (0..BLOCKS).filter(|block| JUDGES.has(*block)).step_by(6).collect();
+        let of_blocks = |there: &[f64], else_: f64| {
+            let of = |block| moves.iter().position(|at| *at == block).map_or(else_, |at| there[at]);
+            (0..BLOCKS).map(of).collect::<Vec<f64>>()
+        };
+        let misses = of_blocks(&[2.9, 2.5, 2.6, 2.2], NOTHING);
+        assert!(strength(&of_blocks(&[2.4, 2.0, 1.7, 1.8], 0.0), &misses, JUDGES) > SURELY);
+        assert!(strength(&of_blocks(&[2.4, 2.0, 0.1, -1.8], 0.0), &misses, JUDGES) < 1.0);
     }
 
     #[test]

@@ -381,3 +381,31 @@ fn most_squares(freedom: usize) -> f64 {
     let part = 2.0 / (9.0 * n);
     n * (1.0 - part + CONTRADICTS * part.sqrt()).powi(3)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A column that one move in a single block holds: cut, its parts can be told from each other, and cover all rows once.
+    #[test]
+    fn what_one_block_tells_is_cut_until_its_parts_can_differ() {
+        let column: Vec<f64> = (0..24_000).map(|i| if (4100..4900).contains(&i) { 1.0 } else { 0.0 }).collect();
+        let mut blocks = blocks_of(&column, MOST_IN_A_BLOCK * dot(&column, &column));
+        blocks.sort_by_key(|rows| rows.start);
+        assert!(blocks.iter().all(|rows| dot(&column[rows.clone()], &column[rows.clone()]) <= 400.0));
+        assert!(blocks.windows(2).all(|pair| pair[0].end == pair[1].start));
+        assert_eq!((blocks[0].start, blocks[blocks.len() - 1].end, blocks.len()), (0, 24_000, 25));
+        // Two halves of the move that say another thing: the law is as unsure as that, and not sure to the last digit.
+        let says = Says::of(std::slice::from_ref(&column)).unwrap();
+        let left: Vec<f64> = (0..24_000).map(|i| column[i] * if i < 4500 { 0.1 } else { -0.1 }).collect();
+        assert!(says.variance(0, &left).sqrt() > 0.1);
+    }
+
+    #[test]
+    fn what_a_few_rows_hold_is_not_cut_for_ever() {
+        let mut column = vec![0.0; 4800];
+        column[1000] = 1.0;
+        let blocks = blocks_of(&column, 0.5);
+        assert!(blocks.iter().all(|rows| rows.len() >= FEWEST_ROWS) && blocks.len() < 40);
+    }
+}

@@ -8,11 +8,12 @@
 //! blocks effectively take part (Imbens and Kolesár 2016).
 
 use super::blocks;
+use super::causes::Trace;
 use super::causes::table_side;
 use super::causes::thermal_drift::SLOWEST;
 use super::fit::{Bench, Fit, Part, Slope, pseudo_inverse};
 use super::grids;
-use super::many::dot;
+use super::many::{add, dot};
 use crate::machine::{Cause, Effect};
 use nalgebra::{DMatrix, DVector};
 
@@ -56,7 +57,8 @@ impl<'s> Unknowns<'s> {
 pub fn strengths(bench: &Bench, fit: &Fit) -> Vec<f64> {
     let slopes = bench.slopes(fit, 0);
     let Unknowns { columns, coefficient_at, first_slope } = Unknowns::of(fit, &slopes);
-    let spread = Spread::of(bench, fit, &columns);
+    // What moves a number in proportion to itself does not make it of nothing.
+    let spread = Spread { by_sampling: DVector::zeros(columns.len()), ..Spread::of(bench, fit, &columns) };
     let misfit = misfit(bench, fit);
     let alone = |unknown: usize| DVector::from_fn(columns.len(), |i, _| f64::from(u8::from(i == unknown)));
     let of_first = |i: usize, part: &Part| {
@@ -266,27 +268,26 @@ struct Spread {
     moves: Vec<DVector<f64>>,
     /// N⁻¹·M_b·N⁻¹: the share of each block in what is known.
     shares: Vec<DMatrix<f64>>,
+    /// By how much what nobody knows of the sampling of the torque moves the unknowns, alike in all blocks.
+    by_sampling: DVector<f64>,
 }
 
 impl Spread {
     fn of(bench: &Bench, fit: &Fit, columns: &[&[f64]]) -> Spread {
         let k = columns.len();
         if k == 0 {
-            return Spread { moves: Vec::new(), shares: Vec::new() };
+            return Spread { moves: Vec::new(), shares: Vec::new(), by_sampling: DVector::zeros(0) };
         }
         // What every fit leaves free is taken off the columns first.
         let free = fit.basis().len() - fit.coefficients.iter().map(Vec::len).sum::<usize>();
-        let cleared: Vec<Vec<f64>> = columns
-            .iter()
-            .map(|column| {
-                let mut c = column.to_vec();
-                for direction in fit.basis().iter().take(free) {
-                    let along = dot(direction, &c);
-                    c.iter_mut().zip(direction).for_each(|(c, d)| *c -= along * d);
-                }
-                c
-            })
-            .collect();
+        let clear = |mut column: Vec<f64>| {
+            for direction in fit.basis().iter().take(free) {
+                let along = dot(direction, &column);
+                add(&mut column, -along, direction);
+            }
+            column
+        };
+        let cleared: Vec<Vec<f64>> = columns.iter().map(|column| clear(column.to_vec())).collect();
         // A column of nothing keeps its zeros.
         let scales: Vec<f64> = (cleared.iter().map(|c| dot(c, c).sqrt()))
             .map(|length| if length > 1e-140 { length } else { 1.0 })
@@ -294,6 +295,15 @@ impl Spread {
         let normal = DMatrix::from_fn(k, k, |i, j| dot(&cleared[i], &cleared[j]) / (scales[i] * scales[j]));
         let pseudo = |m: &DMatrix<f64>| pseudo_inverse(m.clone(), 1e-10).unwrap_or_else(|| DMatrix::identity(k, k));
         let inverse = pseudo(&normal);
+        let in_units = |moved: &DVector<f64>| DVector::from_fn(k, |i, _| moved[i] / scales[i]);
+        let by_sampling = slope_by_sampling(bench).map_or_else(
+            || DVector::zeros(k),
+            |slope| {
+                let slope = clear(slope);
+                let along = DVector::from_fn(k, |i, _| dot(&cleared[i], &slope) / scales[i]);
+                in_units(&(&inverse * along))
+            },
+        );
         let (mut moves, mut shares) = (Vec::new(), Vec::new());
         for block in blocks::within(bench, &cleared, MOST_IN_A_BLOCK) {
             let pieces = bench.pieces(block);
@@ -302,24 +312,25 @@ impl Spread {
             let score = DVector::from_fn(k, |i, _| over(&cleared[i], &fit.residual) / scales[i]);
             // A block that alone knows of something cannot be left out; a twentieth of it stays.
             let moved = pseudo(&(&normal - &own * 0.95)) * score;
-            moves.push(DVector::from_fn(k, |i, _| moved[i] / scales[i]));
+            moves.push(in_units(&moved));
             let share = &inverse * own * &inverse;
             shares.push(DMatrix::from_fn(k, k, |i, j| share[(i, j)] / (scales[i] * scales[j])));
         }
-        Spread { moves, shares }
+        Spread { moves, shares, by_sampling }
     }
 
     /// Covariance of two unknowns.
     fn covariance(&self, i: usize, j: usize) -> f64 {
         let blocks = self.moves.len() as f64;
-        self.moves.iter().map(|m| m[i] * m[j]).sum::<f64>() * (blocks - 1.0) / blocks
+        let by_blocks = self.moves.iter().map(|m| m[i] * m[j]).sum::<f64>() * (blocks - 1.0) / blocks;
+        by_blocks + self.by_sampling[i] * self.by_sampling[j]
     }
 
     /// Deviation of the parameter with this gradient by the unknowns.
     fn deviation(&self, gradient: &DVector<f64>) -> f64 {
         let blocks = self.moves.len() as f64;
         let variance: f64 = self.moves.iter().map(|m| gradient.dot(m).powi(2)).sum::<f64>() * (blocks - 1.0) / blocks;
-        variance.max(0.0).sqrt() * self.widening(gradient)
+        (variance.max(0.0).sqrt() * self.widening(gradient)).hypot(gradient.dot(&self.by_sampling))
     }
 
     /// By how much few blocks widen it.
@@ -329,6 +340,14 @@ impl Spread {
         let taking_part = if squares > 0.0 { sum * sum / squares } else { 1.0 };
         widening(taking_part)
     }
+}
+
+/// What is measured the more, the later the torque column is by its sampling, per standard deviation of what nobody knows of that.
+fn slope_by_sampling(bench: &Bench) -> Option<Vec<f64>> {
+    let open_s = bench.frame.sampling.deviation_s();
+    let [after, before] = [open_s, -open_s].map(|late_s| bench.frame.torque(late_s));
+    let slope = || after.iter().zip(&before).map(|(after, before)| 0.5 * (after - before)).collect();
+    (open_s > 0.0).then(|| bench.stack(&Trace::torque(slope())))
 }
 
 /// Half-width of Student's central 95 % over that of the normal distribution, by Fisher's expansion; fewer than two degrees
