@@ -204,8 +204,7 @@ pub fn effects(bench: &Bench, fit: &Fit, sure: Option<&Sure>) -> Vec<Option<(Eff
             }
             match (effect, deviations.as_mut_slice()) {
                 (Effect::DeadTime { .. }, [deviation]) => {
-                    let by_frame = bench.frame.sampling.deviation_s().hypot(grids::delay_s(bench.frame));
-                    *deviation = deviation.hypot(1e3 * by_frame);
+                    *deviation = deviation.hypot(1e3 * grids::delay_s(bench.frame));
                 }
                 (Effect::DriveCompliance { .. }, [.., deviation]) => {
                     *deviation = deviation.hypot(table_side::open_damping(bench.frame, &effect));
