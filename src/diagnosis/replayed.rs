@@ -10,24 +10,22 @@
 //! over contiguous blocks, and the torque 0 ± 1: together a/(1 + V), with the variance V/(1 + V).
 
 use super::belief;
+use super::blocks;
 use super::fit::{self, Bench, Fit};
 use super::gain::HeldOut;
 use super::judge::Judged;
 use super::many::{add, dot};
 use super::progress::{Stopped, Watch};
-use super::uncertainty::{self, SIMULATED, Sure, widening};
+use super::uncertainty::{self, MOST_IN_A_BLOCK, SIMULATED, Sure, widening};
 use crate::analysis::statistics;
 use crate::machine::Axis;
 use crate::plant::closed_loop::{Part, rows_of_the_beginning};
 use crate::plant::linear::{decomposed, rms};
 use crate::plant::observed::Observed;
 use nalgebra::{DMatrix, DVector};
-use std::ops::Range;
 
-/// Contiguous blocks by which the position's word is judged, what one of them may hold of what is told, and rows that are not cut.
+/// Contiguous blocks by which the position's word is judged.
 const BLOCKS: usize = 24;
-const MOST_IN_A_BLOCK: f64 = 0.5;
-const FEWEST_ROWS: usize = 32;
 /// How much of a recording is replayed at most, s, and plant steps of that, of a rigid axis and of two masses, which take three times
 /// as long for one.
 const MOST_S: f64 = 40.0;
@@ -339,8 +337,9 @@ impl Says {
         if self.squares[i] <= LEAST {
             return f64::INFINITY;
         }
+        let length = left.len().div_ceil(BLOCKS).max(1);
         let (mut sum, mut sum_of_shares, mut blocks) = (0.0, 0.0, 0.0);
-        for rows in blocks_of(&self.along[i], MOST_IN_A_BLOCK * self.squares[i]) {
+        for rows in blocks::of_column(&self.along[i], length, MOST_IN_A_BLOCK) {
             let (column, left) = (&self.along[i][rows.clone()], &left[rows]);
             let share = dot(column, column) / self.squares[i];
             // A block that alone knows of something cannot be left out; a twentieth of it stays.
@@ -351,25 +350,6 @@ impl Says {
         }
         (SIMULATED * widening(1.0 / sum_of_shares)).powi(2) * (blocks - 1.0) / blocks * sum
     }
-}
-
-/// Contiguous blocks of a column. One that holds more than `most` of its squares is cut in two: what a single block tells fits it by
-/// itself, and by nothing that it leaves would anybody see how sure that is.
-fn blocks_of(column: &[f64], most: f64) -> Vec<Range<usize>> {
-    let length = column.len().div_ceil(BLOCKS).max(1);
-    let mut open: Vec<Range<usize>> =
-        (0..column.len()).step_by(length).map(|from| from..(from + length).min(column.len())).collect();
-    let mut blocks = Vec::with_capacity(open.len());
-    while let Some(rows) = open.pop() {
-        let held = dot(&column[rows.clone()], &column[rows.clone()]);
-        if held > most && rows.len() >= 2 * FEWEST_ROWS {
-            let middle = rows.start.midpoint(rows.end);
-            open.extend([rows.start..middle, middle..rows.end]);
-        } else {
-            blocks.push(rows);
-        }
-    }
-    blocks
 }
 
 /// Squares below which there is nothing, as where a cause does not move the motor at all.
@@ -386,26 +366,13 @@ fn most_squares(freedom: usize) -> f64 {
 mod tests {
     use super::*;
 
-    /// A column that one move in a single block holds: cut, its parts can be told from each other, and cover all rows once.
+    /// What one move in one block tells: its parts say another thing, and the law is as unsure as that, not sure to the last digit.
     #[test]
-    fn what_one_block_tells_is_cut_until_its_parts_can_differ() {
+    fn what_one_block_tells_is_no_surer_than_its_parts_agree() {
         let column: Vec<f64> = (0..24_000).map(|i| if (4100..4900).contains(&i) { 1.0 } else { 0.0 }).collect();
-        let mut blocks = blocks_of(&column, MOST_IN_A_BLOCK * dot(&column, &column));
-        blocks.sort_by_key(|rows| rows.start);
-        assert!(blocks.iter().all(|rows| dot(&column[rows.clone()], &column[rows.clone()]) <= 400.0));
-        assert!(blocks.windows(2).all(|pair| pair[0].end == pair[1].start));
-        assert_eq!((blocks[0].start, blocks[blocks.len() - 1].end, blocks.len()), (0, 24_000, 25));
-        // Two halves of the move that say another thing: the law is as unsure as that, and not sure to the last digit.
         let says = Says::of(std::slice::from_ref(&column)).unwrap();
         let left: Vec<f64> = (0..24_000).map(|i| column[i] * if i < 4500 { 0.1 } else { -0.1 }).collect();
-        assert!(says.variance(0, &left).sqrt() > 0.1);
-    }
-
-    #[test]
-    fn what_a_few_rows_hold_is_not_cut_for_ever() {
-        let mut column = vec![0.0; 4800];
-        column[1000] = 1.0;
-        let blocks = blocks_of(&column, 0.5);
-        assert!(blocks.iter().all(|rows| rows.len() >= FEWEST_ROWS) && blocks.len() < 40);
+        let deviation = says.variance(0, &left).sqrt();
+        assert!(deviation > 0.1, "{deviation}");
     }
 }

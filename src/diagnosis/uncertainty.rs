@@ -27,7 +27,7 @@ const LAW_HOLDS: f64 = 1e-3;
 pub(super) const SIMULATED: f64 = 3.0;
 
 /// Share of an unknown's column that one block may hold: leaving out a block that holds all of it would not move it.
-const MOST_IN_A_BLOCK: f64 = 0.5;
+pub(super) const MOST_IN_A_BLOCK: f64 = 0.5;
 
 /// Unknowns of a fit, as columns of its equations: coefficients of all parts in order, then the non-linear parameters.
 struct Unknowns<'s> {
@@ -57,8 +57,7 @@ impl<'s> Unknowns<'s> {
 pub fn strengths(bench: &Bench, fit: &Fit) -> Vec<f64> {
     let slopes = bench.slopes(fit, 0);
     let Unknowns { columns, coefficient_at, first_slope } = Unknowns::of(fit, &slopes);
-    // What moves a number in proportion to itself does not make it of nothing.
-    let spread = Spread { by_sampling: DVector::zeros(columns.len()), ..Spread::of(bench, fit, &columns) };
+    let spread = Spread::of(bench, fit, &columns);
     let misfit = misfit(bench, fit);
     let alone = |unknown: usize| DVector::from_fn(columns.len(), |i, _| f64::from(u8::from(i == unknown)));
     let of_first = |i: usize, part: &Part| {
@@ -136,7 +135,7 @@ pub fn effects(bench: &Bench, fit: &Fit, sure: Option<&Sure>) -> Vec<Option<(Eff
     let deviation_of = |part: &Part, gradient: &DVector<f64>| match (&by_blocks, sure) {
         (Some((spread, misfit)), _) => {
             let widened = if part.law.is_simulated() { SIMULATED * misfit } else { 1.0 };
-            widened * spread.deviation(gradient)
+            (widened * spread.deviation(gradient)).hypot(gradient.dot(&spread.by_sampling))
         }
         (None, Some(sure)) => gradient.dot(&(&sure.covariance * gradient)).max(0.0).sqrt(),
         (None, None) => 0.0,
@@ -267,7 +266,8 @@ struct Spread {
     moves: Vec<DVector<f64>>,
     /// N⁻¹·M_b·N⁻¹: the share of each block in what is known.
     shares: Vec<DMatrix<f64>>,
-    /// By how much what nobody knows of the sampling of the torque moves the unknowns, alike in all blocks.
+    /// By how much what nobody knows of the sampling of the torque moves the unknowns: alike in all blocks, which say nothing of it,
+    /// and in proportion to what is there, so that it makes nothing of nothing.
     by_sampling: DVector<f64>,
 }
 
@@ -321,15 +321,14 @@ impl Spread {
     /// Covariance of two unknowns.
     fn covariance(&self, i: usize, j: usize) -> f64 {
         let blocks = self.moves.len() as f64;
-        let by_blocks = self.moves.iter().map(|m| m[i] * m[j]).sum::<f64>() * (blocks - 1.0) / blocks;
-        by_blocks + self.by_sampling[i] * self.by_sampling[j]
+        self.moves.iter().map(|m| m[i] * m[j]).sum::<f64>() * (blocks - 1.0) / blocks
     }
 
     /// Deviation of the parameter with this gradient by the unknowns.
     fn deviation(&self, gradient: &DVector<f64>) -> f64 {
         let blocks = self.moves.len() as f64;
         let variance: f64 = self.moves.iter().map(|m| gradient.dot(m).powi(2)).sum::<f64>() * (blocks - 1.0) / blocks;
-        (variance.max(0.0).sqrt() * self.widening(gradient)).hypot(gradient.dot(&self.by_sampling))
+        variance.max(0.0).sqrt() * self.widening(gradient)
     }
 
     /// By how much few blocks widen it.
