@@ -304,7 +304,8 @@ fn a_scale_adds_no_noise_to_the_torque_behind_a_spring() {
 }
 
 /// A servo answers to the steps of its encoder. The slope of that answer goes with what the balance has of them through the inertia,
-/// so that the torque seems earlier than it is: that much is in the uncertainty.
+/// so that the torque seems earlier than it is: through the usual low-pass by 0.3 ms here. That much is in the uncertainty, so that a
+/// quieter look is asked, and what is left of it is in the uncertainty of that.
 #[test]
 fn a_delay_is_as_uncertain_as_what_a_servo_makes_of_a_coarse_grid() {
     let stiff = |effects: &[Effect]| {
@@ -318,7 +319,7 @@ fn a_delay_is_as_uncertain_as_what_a_servo_makes_of_a_coarse_grid() {
         let d = judged(&stiff(&[]), &recorded_by(&truth, &test_moves(), seed, sensors, false));
         let [Effect::DeadTime { delay_ms }] = d.extended.effects[..] else { panic!("{:?}", d.extended.effects) };
         let (off, deviation) = ((delay_ms + 2.0).abs(), d.findings[0].deviations[0]);
-        assert!(off < 2.0 * deviation && (0.02..0.4).contains(&deviation), "{seed}: {delay_ms} ± {deviation}");
+        assert!(off < 0.1 && off < 2.0 * deviation && deviation < 0.2, "{seed}: {delay_ms} ± {deviation}");
     }
 }
 
