@@ -17,7 +17,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// How exactly a law holds on a machine, as a share of what it makes near by.
-const LAW_HOLDS: f64 = 1.0 / 30.0;
+pub const LAW_HOLDS: f64 = 1.0 / 30.0;
 /// The same of the torque of a clearance, and of the way that its table goes between the flanks: an impact comes some rows early or
 /// late and is harder or softer than flanks without rebound make it.
 /// On twelve random clearances that were found on one recording and believed on another the rows within [`NEAR_S`] of impacts were

@@ -7,6 +7,7 @@ use crate::diagnosis::causes::table_side::{split, swing_of};
 use crate::diagnosis::causes::{Law, Resistance, Rest, Scale, law};
 use crate::diagnosis::fit::pseudo_inverse;
 use crate::diagnosis::frame::Frame;
+use crate::diagnosis::known::LAW_HOLDS;
 use crate::diagnosis::uncertainty::{SIMULATED, widening};
 use crate::machine::{Axis, Cause, Effect};
 use nalgebra::{DMatrix, DVector};
@@ -14,6 +15,8 @@ use rayon::prelude::*;
 
 /// Share of the believed dry friction that a cause makes where it is tried first.
 const SMALL: f64 = 0.02;
+/// The same of friction that rises where an axis creeps.
+const STICKING: [f64; 3] = [0.1, 0.3, 0.8];
 /// Small steps: of a logarithm, in steps of a linear scale, and as a share of a coefficient.
 const STEP_OF_LOG: f64 = 0.04;
 const STEPS_OF_LINEAR: f64 = 2.0;
@@ -36,6 +39,9 @@ const STEPS: usize = 12;
 const FEW: usize = 3;
 /// What a step must take off the misses for another one.
 const LITTLE: f64 = 3e-3;
+/// Times its velocity up to which friction that rises at low speed acts, and the share of the judged rows that are few.
+const TWICE: f64 = 2.0;
+const FEW_ROWS: f64 = 0.1;
 /// Share of a block that stays where it alone knows of something.
 const MOST_LEFT_OUT: f64 = 0.95;
 
@@ -84,7 +90,15 @@ pub fn starts(frame: &Frame, law: &'static Law) -> Vec<Trial> {
         | DirectionDependentFriction
         | QuadraticDrag
         | CableForce => in_proportion(all()),
-        StribeckFriction | ThermalDrift => in_proportion(all().into_iter().step_by(3).collect()),
+        ThermalDrift => in_proportion(all().into_iter().step_by(3).collect()),
+        StribeckFriction => {
+            // An axis that creeps sticks by it, and what its loop then does goes with no number in proportion.
+            let sizes = |shape: Vec<f64>| {
+                STICKING.map(|size| trial(shape.clone(), vec![size * frame.belief.coulomb], true, false))
+            };
+            let sticking = all().into_iter().step_by(2).flat_map(sizes).filter(|trial| trial.acts_in_few_rows(frame));
+            sticking.chain(in_proportion(all().into_iter().step_by(3).collect())).collect()
+        }
         PreslidingFriction => {
             let bristles = all().into_iter().filter(|shape| shape[1..] == BRISTLE).step_by(2);
             let trial =
@@ -171,10 +185,17 @@ impl Trial {
         }
     }
 
-    /// Whether it acts in few rows, and not in proportion to a number.
+    /// Whether it acts in few rows, so that the low-pass of the torque hides it. What acts in proportion to a number does so in all, but for
+    /// friction that rises where the axis creeps; that must be more than a law of friction holds to.
     #[must_use]
-    pub fn acts_in_few_rows(&self) -> bool {
-        !self.linear
+    pub fn acts_in_few_rows(&self, frame: &Frame) -> bool {
+        let (Cause::StribeckFriction, [velocity, _], [torque]) =
+            (self.law.cause, self.shape.as_slice(), self.coefficients.as_slice())
+        else {
+            return !self.linear;
+        };
+        let slow = frame.kept.iter().filter(|&&row| frame.v[row].abs() < TWICE * velocity).count();
+        torque.abs() > LAW_HOLDS * frame.belief.coulomb && (slow as f64) < FEW_ROWS * frame.kept.len() as f64
     }
 
     /// The spring that a clearance is whose flanks give more under the friction of the table, to either side, than it is wide: one may be as
