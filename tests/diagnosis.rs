@@ -276,10 +276,12 @@ fn rows_that_are_not_used_are_told() {
 fn a_law_without_a_name_is_not_imitated_by_several_that_have_one() {
     /// Torque of time, position, speed and acceleration.
     type Extra = fn(f64, f64, f64, f64) -> f64;
-    let laws: [(&str, Extra); 6] = [
+    let laws: [(&str, Extra); 8] = [
         ("cube of speed", |_, _, v, _| 0.15 * (v / 60.0).powi(3)),
         ("step along the stroke", |_, x, _, _| if x > 104.0 { 0.1 } else { -0.1 }),
         ("grows with acceleration", |_, _, v, a| 0.2 * v.signum() * (a / 150.0).abs()),
+        ("power of acceleration", |_, _, _, a| 0.3 * (a / 150.0).powi(3)),
+        ("square of the way from one place", |_, x, _, _| 0.2 * ((x - 100.0) / 60.0).powi(2)),
         ("drag that changes evenly along the stroke", |_, x, v, _| 0.15 * (v / 60.0) * (x - 100.0) / 60.0),
         ("friction that is another from one moment on", |t, _, v, _| if t > 17.0 { 0.2 * v.signum() } else { 0.0 }),
         ("push changes evenly in time", |t, _, v, a| 0.004 * t * (0.0019 * a + 0.005 * v + 0.9 * v.signum() + 0.1)),

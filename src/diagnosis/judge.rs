@@ -8,7 +8,6 @@
 
 use super::belief;
 use super::contact;
-use super::delayed;
 use super::fit::{Bench, Fit};
 use super::followed::{self, is_followed};
 use super::foreign;
@@ -18,6 +17,7 @@ use super::gain::{self, Errors, Gain, HeldOut, Replay};
 use super::known::Known;
 use super::progress::{Stopped, Watch};
 use super::select::Selection;
+use super::shared;
 use super::show::{self, Coordinate};
 use super::steady;
 use super::verdict::Verdict;
@@ -101,7 +101,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     /// [`Stopped`] when the watch's caller said so.
     pub fn judge(&self, mut found: Selection) -> Result<Judged, Stopped> {
         let kept = self.held_out.kept();
-        if let Some(without) = delayed::left_out(self.bench, kept, &found.fit) {
+        if let Some(without) = shared::left_out(self.bench, kept, &found.fit) {
             (found.fit, found.alike) = (without, Vec::new());
         }
         let Some(mut verdict) = self.explains(&found.fit) else { return Ok(self.too_little(&found)) };

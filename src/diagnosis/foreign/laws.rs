@@ -29,7 +29,7 @@ impl Foreign {
     }
 }
 
-pub static LAWS: [Foreign; 37] = [
+pub static LAWS: [Foreign; 39] = [
     Foreign {
         goes: "with the cube of speed",
         numbers: 1,
@@ -105,6 +105,17 @@ pub static LAWS: [Foreign; 37] = [
         regressors: |frame, _| vec![frame.judged_by(|i| frame.direction[i] * frame.a[i].abs())],
     },
     Foreign {
+        goes: "with a power of acceleration",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| {
+            let largest = frame.a.iter().fold(1e-300f64, |largest, a| largest.max(a.abs()));
+            let mut powers: Vec<f64> = frame.a.iter().map(|a| a.abs() / largest).collect();
+            to_the_power(&mut powers, LEAST_POWER + (LARGEST_POWER - LEAST_POWER) * share);
+            vec![frame.judged_by(|i| powers[i].copysign(frame.a[i]))]
+        },
+    },
+    Foreign {
         goes: "as a friction that grows with the load",
         numbers: 2,
         somewhere: false,
@@ -150,6 +161,15 @@ pub static LAWS: [Foreign; 37] = [
         numbers: 3,
         somewhere: true,
         regressors: |frame, share| on_either_side(frame, share, |_| 1.0),
+    },
+    Foreign {
+        goes: "with the square of the way from one place",
+        numbers: 2,
+        somewhere: true,
+        regressors: |frame, share| {
+            let place = between(frame, share, |i| frame.x[i]);
+            vec![frame.judged_by(|i| (frame.x[i] - place).powi(2))]
+        },
     },
     Foreign {
         goes: "as a torque that is another from one moment on",
@@ -292,6 +312,9 @@ pub static LAWS: [Foreign; 37] = [
 
 /// Largest exponent of a root: with more it is hardly another law than viscous friction.
 const LARGEST_EXPONENT: f64 = 0.75;
+/// Exponents of acceleration: with less it is hardly another law than inertia.
+const LEAST_POWER: f64 = 1.5;
+const LARGEST_POWER: f64 = 5.0;
 /// The shortest length, as a share of the stroke, the shortest time, of the longest, and the lowest speed, of the top speed.
 const SHORTEST: f64 = 0.003;
 /// The longest time by which something comes late, s.
