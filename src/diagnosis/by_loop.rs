@@ -81,7 +81,7 @@ pub fn completed(
     let named = || found.findings.iter().map(|finding| finding.effect).filter(about).map(|effect| effect.cause());
     let (slow, doubtful): (Vec<Cause>, Vec<Cause>) = named().partition(|cause| *cause == Cause::StribeckFriction);
     // Where more of these are there the loop misses by what their numbers are off by, for which another stands in.
-    let silent = axis.effects.iter().any(about) || doubtful.len() > 1;
+    let silent = axis.effects.iter().any(about) || doubtful.len() + slow.len() > 1;
     let Some(known) = &found.replay else { return Ok(found) };
     let much = is_much(&misses(&known.error, statistics::reading_error(&whole.position)));
     let Some(observed) = much.then(|| whole.observed()).flatten() else { return Ok(found) };
@@ -91,7 +91,11 @@ pub fn completed(
     let Some(missed) = Missed::by(&found.extended, &replays) else { return Ok(found) };
     let gives_way = if silent { Vec::new() } else { gives_way(doubtful, slow) };
     let mut best: Option<(f64, Told, Axis, Vec<Cause>)> = None;
-    for dropped in gives_way {
+    for (nth, dropped) in gives_way.into_iter().enumerate() {
+        // In the place of what many rows show only what may stand beside it is tried.
+        if nth > 0 && best.is_none() {
+            break;
+        }
         let stays = found.extended.effects.iter().filter(|effect| !dropped.contains(&effect.cause())).copied();
         let without = found.extended.with_effects(stays.collect());
         let base = belief::base_alone(&without);
