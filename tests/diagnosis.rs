@@ -299,11 +299,8 @@ fn what_fits_nothing_is_called_unknown() {
     let level = |t: f64| if ((t * 0.37).sin() + (t * 0.83).sin()) > 0.2 { 0.25 } else { -0.25 };
     let d = judged(&recording(|t, _, _, _| level(t)));
     assert_eq!(d.verdict, Verdict::UnknownCause, "{:?}", d.findings);
-    assert!(
-        d.findings.is_empty() && d.unexplained.torque.describes.contains("lives in"),
-        "{}",
-        d.unexplained.torque.describes
-    );
+    let describes = &d.unexplained.torque.describes;
+    assert!(d.findings.is_empty() && describes.contains("lives in"), "{describes}");
 }
 
 /// A current that was filtered over some rows makes noise that second differences see too little of; what wanders over seconds is
