@@ -186,7 +186,8 @@ impl Trial {
     }
 
     /// Whether it acts in few rows, so that the low-pass of the torque hides it. What acts in proportion to a number does so in all, but for
-    /// friction that rises where the axis creeps; that must be more than a law of friction holds to.
+    /// friction that rises where the axis creeps; that must be more than a law of friction holds to, and none that falls: towards a rest friction
+    /// without a jump does so, and that is another formulation.
     #[must_use]
     pub fn acts_in_few_rows(&self, frame: &Frame) -> bool {
         let (Cause::StribeckFriction, [velocity, _], [torque]) =
@@ -195,7 +196,7 @@ impl Trial {
             return !self.linear;
         };
         let slow = frame.kept.iter().filter(|&&row| frame.v[row].abs() < TWICE * velocity).count();
-        torque.abs() > LAW_HOLDS * frame.belief.coulomb && (slow as f64) < FEW_ROWS * frame.kept.len() as f64
+        *torque > LAW_HOLDS * frame.belief.coulomb && (slow as f64) < FEW_ROWS * frame.kept.len() as f64
     }
 
     /// The spring that a clearance is whose flanks give more under the friction of the table, to either side, than it is wide: one may be as
