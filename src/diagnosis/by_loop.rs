@@ -78,36 +78,43 @@ pub fn completed(
     watch: &Watch,
 ) -> Result<Diagnosis, Stopped> {
     let about = |effect: &Effect| ABOUT_REVERSALS.contains(&effect.cause());
-    let named = || found.findings.iter().map(|finding| finding.effect).filter(about).map(|effect| effect.cause());
-    let (slow, doubtful): (Vec<Cause>, Vec<Cause>) = named().partition(|cause| *cause == Cause::StribeckFriction);
+    let named: Vec<Cause> =
+        found.findings.iter().map(|finding| finding.effect).filter(about).map(|effect| effect.cause()).collect();
     // Where more of these are there the loop misses by what their numbers are off by, for which another stands in.
-    let silent = axis.effects.iter().any(about) || doubtful.len() + slow.len() > 1;
-    let Some(known) = &found.replay else { return Ok(found) };
+    let silent = axis.effects.iter().any(about) || named.len() > 1;
+    let Some(known) = found.replay.as_ref().filter(|_| !silent) else { return Ok(found) };
     let much = is_much(&misses(&known.error, statistics::reading_error(&whole.position)));
     let Some(observed) = much.then(|| whole.observed()).flatten() else { return Ok(found) };
     let servo = ByServo::of(axis, &observed);
     let recording = (&observed, &servo);
     let Some(replays) = Replays::new(recording, known, watch) else { return Ok(found) };
     let Some(missed) = Missed::by(&found.extended, &replays) else { return Ok(found) };
-    let gives_way = if silent { Vec::new() } else { gives_way(doubtful, slow) };
-    let mut best: Option<(f64, Told, Axis, Vec<Cause>)> = None;
-    for (nth, dropped) in gives_way.into_iter().enumerate() {
-        // In the place of what many rows show only what may stand beside it is tried.
-        if nth > 0 && best.is_none() {
-            break;
-        }
+    let without = |dropped: &[Cause]| {
         let stays = found.extended.effects.iter().filter(|effect| !dropped.contains(&effect.cause())).copied();
-        let without = found.extended.with_effects(stays.collect());
+        found.extended.with_effects(stays.collect())
+    };
+    let asked = |dropped: &[Cause]| -> Result<Option<(f64, Told)>, Stopped> {
+        let without = without(dropped);
         let base = belief::base_alone(&without);
-        let frame = (&frame.believing(&base), whole);
-        let told = told(axis, &replays, frame, (&missed, &found.extended, &without), watch)?;
-        let told = told.filter(|(_, told)| !dropped.contains(&told.finding.effect.cause()));
-        let better = |missed: f64| best.as_ref().is_none_or(|(beside, ..)| missed < ALIKE_LEFT * beside);
-        if let Some((missed, told)) = told.filter(|(missed, _)| better(*missed)) {
-            best = Some((missed, told, without, dropped));
+        let machines = [&found.extended, &without];
+        let told = told(axis, &replays, (&frame.believing(&base), whole), (&missed, machines), watch)?;
+        Ok(told.filter(|(_, told)| !dropped.contains(&told.finding.effect.cause())))
+    };
+    // One that the torque names may stand in for another, and gives way to that. Friction that rises at low speed the torque shows in many
+    // rows, so that it may be there beside another as well, and in its place only what may stand beside it is tried.
+    let best = if named == [Cause::StribeckFriction] {
+        match asked(&[])? {
+            Some((beside, told)) => {
+                let in_place = asked(&named)?.filter(|(missed, _)| *missed < ALIKE_LEFT * beside);
+                Some(in_place.map_or((told, &[][..]), |(_, told)| (told, named.as_slice())))
+            }
+            None => None,
         }
-    }
-    if let Some((_, told, without, dropped)) = best {
+    } else {
+        asked(&named)?.map(|(_, told)| (told, named.as_slice()))
+    };
+    if let Some((told, dropped)) = best {
+        let without = without(dropped);
         let mut stays = found.clone();
         stays.findings.retain(|finding| !dropped.contains(&finding.effect.cause()));
         let rest = 1.0 - stays.findings.iter().map(|finding| finding.share).sum::<f64>().min(1.0);
@@ -118,27 +125,19 @@ pub fn completed(
             return Ok(retold);
         }
     }
-    let is_silent =
-        matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained) && is_a_cycle_a_row(axis, &observed);
-    let note = is_silent.then(|| {
-        let missed = replays.says(&missed.error, axis);
-        format!("no cause explains by how much the closed loop of this machine, replayed, typically misses the measured position: {missed}. Its servo may be another than is believed, or something acts that the torque does not show")
-    });
-    let mut notes = found.notes.clone();
-    notes.extend(note);
+    let note = note_of_miss(axis, &found, &observed, &replays.says(&missed.error, axis));
+    let notes = found.notes.iter().cloned().chain(note).collect();
     Ok(Diagnosis { notes, ..found })
 }
 
-/// Which of the causes that the torque names may stand in for another, and give way to that, one try each. Friction that rises at low
-/// speed the torque shows in many rows, so that it may be there beside another as well.
-fn gives_way(doubtful: Vec<Cause>, slow: Vec<Cause>) -> Vec<Vec<Cause>> {
-    let alone = doubtful.is_empty() && !slow.is_empty();
-    [Some(doubtful), alone.then_some(slow)].into_iter().flatten().collect()
-}
-
-/// Between rows that are further apart the command may have gone any way.
-fn is_a_cycle_a_row(axis: &Axis, observed: &Observed) -> bool {
-    axis.servo.as_ref().is_some_and(|servo| (observed.period_s / servo.period_s - 1.0).abs() < 1e-3)
+/// What is said of a miss that no cause explains beside an answer that says nothing is left. Between rows that are further apart than
+/// cycles the command may have gone any way.
+fn note_of_miss(axis: &Axis, found: &Diagnosis, observed: &Observed, missed: &str) -> Option<String> {
+    let nothing_left = matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained);
+    let is_known = axis.servo.as_ref().is_some_and(|servo| observed.is_a_row_a_cycle(servo));
+    (nothing_left && is_known).then(|| {
+        format!("no cause explains by how much the closed loop of this machine, replayed, typically misses the measured position: {missed}. Its servo may be another than is believed, or something acts that the torque does not show")
+    })
 }
 
 /// By how much the replayed loop of a machine misses the measured position where that is much, and more than the encoder makes it miss.
@@ -208,12 +207,13 @@ struct Told {
     by_half: Axis,
 }
 
-/// What the loop tells beside the second machine, and better than the first does, after what its numbers from one half miss of the other.
+/// What the loop tells beside the second machine, and better than the first does, which misses by so much; and what is missed still, by
+/// numbers from one half of the blocks in the other.
 fn told(
     axis: &Axis,
     replays: &Replays,
     (frame, whole): (&Frame, &Columns),
-    (Missed { error: before, misses, avoidable }, named, extended): (&Missed, &Axis, &Axis),
+    (Missed { error: before, misses, avoidable }, [named, extended]): (&Missed, [&Axis; 2]),
     watch: &Watch,
 ) -> Result<Option<(f64, Told)>, Stopped> {
     let best = promising(axis, &replays.beginning(), frame, extended, watch)?;
@@ -411,16 +411,19 @@ mod tests {
         answer.findings.iter().map(|finding| finding.effect).collect()
     }
 
-    #[test]
-    fn a_clearance_that_the_torque_does_not_show_is_told() {
-        let hidden = Effect::Backlash {
-            width_um: 5.0,
+    fn clearance(width_um: f64) -> Effect {
+        Effect::Backlash {
+            width_um,
             table_inertia_share: 0.4,
             table_friction_share: 0.6,
             contact_hz: 600.0,
             contact_damping_ratio: 0.3,
-        };
-        let told = told(&[hidden]);
+        }
+    }
+
+    #[test]
+    fn a_clearance_that_the_torque_does_not_show_is_told() {
+        let told = told(&[clearance(5.0)]);
         let [Effect::Backlash { width_um, .. }] = told.as_slice() else { panic!("{told:?}") };
         assert!((width_um / 5.0 - 1.0).abs() < 0.1, "{width_um}");
     }
@@ -428,14 +431,7 @@ mod tests {
     #[test]
     fn a_clearance_beside_friction_that_rises_at_low_speed_is_told() {
         let slow = Effect::StribeckFriction { torque: 0.2, velocity_mm_s: 12.0, exponent: 2.0 };
-        let hidden = Effect::Backlash {
-            width_um: 4.0,
-            table_inertia_share: 0.4,
-            table_friction_share: 0.6,
-            contact_hz: 600.0,
-            contact_damping_ratio: 0.3,
-        };
-        let told = told_beside(&[slow], &recorded(&[slow, hidden], 0.05));
+        let told = told_beside(&[slow], &recorded(&[slow, clearance(4.0)], 0.05));
         let [stays, Effect::Backlash { width_um, .. }] = told.as_slice() else { panic!("{told:?}") };
         assert_eq!(*stays, slow);
         assert!((width_um / 4.0 - 1.0).abs() < 0.1, "{width_um}");

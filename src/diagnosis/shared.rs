@@ -24,8 +24,7 @@ const FEWER_ROWS: usize = 16;
 /// A set of causes without a delay or an inertia that is none; `None` where there is no such. `kept` is what of the axis is believed.
 #[must_use]
 pub fn left_out(bench: &Bench, kept: &Axis, fit: &Fit) -> Option<Fit> {
-    let may_be = |fit: &Fit| fit.table().is_none() && fit.parts.iter().any(|part| SHARED.contains(&part.law.cause));
-    if !may_be(fit) {
+    if fit.table().is_some() || !fit.parts.iter().any(|part| SHARED.contains(&part.law.cause)) {
         return None;
     }
     let frame = bench.frame;
@@ -41,9 +40,8 @@ pub fn left_out(bench: &Bench, kept: &Axis, fit: &Fit) -> Option<Fit> {
         let order = (0..fit.parts.len()).filter(|i| *i != at).chain([at]);
         let parts = order.flat_map(|i| on_wide.parts(fit.parts[i].law, vec![fit.parts[i].shape.clone()])).collect();
         let there = on_wide.refine(on_wide.fit(parts), fit.parts.len() - 1, STEPS);
-        let here = number(bench, fit, at)?;
-        let far = number(&on_wide, &there, fit.parts.len() - 1)?;
-        if is_contradicted(here, far) {
+        let (here, far) = (number(bench, fit, at), number(&on_wide, &there, fit.parts.len() - 1));
+        if here.zip(far).is_some_and(|(here, far)| is_contradicted(here, far)) {
             stays = Some(bench.refine(bench.without(fit, at), 0, STEPS));
         }
     }

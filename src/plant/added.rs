@@ -126,16 +126,13 @@ impl<'o> ByLaw<'o> {
     /// `None` where rows are not cycles without a gap, or no command was recorded.
     fn of(axis: &'o Axis, observed: &'o Observed, speed: CommandSpeed) -> Option<Self> {
         let (servo, command) = (axis.servo.as_ref()?, observed.command.as_deref()?);
-        let rows = observed.time_s.len();
-        let row_a_cycle =
-            (observed.period_s / servo.period_s - 1.0).abs() < 1e-3 && observed.runs.first() == Some(&(0..rows));
-        if !row_a_cycle || !command.iter().all(|x| x.is_finite()) {
+        if !observed.is_a_row_a_cycle(servo) || !command.iter().all(|x| x.is_finite()) {
             return None;
         }
         let law = Self { axis, servo, observed, command, speed, late: 0, level: 0.0, spread: 0.0, change: 0.0 };
         // Enough cycles for a median: which, its own torque, and that of the next.
         let mut some: Vec<(usize, [f64; 2])> = Vec::new();
-        let mut wanted = law.inner().step_by(rows.div_ceil(ENOUGH).max(1)).peekable();
+        let mut wanted = law.inner().step_by(observed.time_s.len().div_ceil(ENOUGH).max(1)).peekable();
         for (cycle, own) in law.own_torque().enumerate() {
             if let Some((_, own_torques)) = some.last_mut().filter(|(last, _)| last + 1 == cycle) {
                 own_torques[1] = own;

@@ -5,11 +5,14 @@
 use super::bridges::{Bridges, Filled};
 use super::motion::{FEWEST_ROWS, Motion};
 use super::stamps::times_of_rows;
-use crate::machine::Axis;
+use crate::machine::{Axis, Servo};
 use crate::recording::{Recording, RecordingError, Signal, Unit};
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
+
+/// Share by which the period of rows may differ from that of cycles: no two periods of a control are closer, and no two clocks differ as much.
+const SAME_PERIOD: f64 = 1e-3;
 
 /// What a recording shows of one axis. All columns have one value a row.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +38,12 @@ pub struct Observed {
 }
 
 impl Observed {
+    /// Whether there is one row a cycle of a servo, and no gap.
+    #[must_use]
+    pub fn is_a_row_a_cycle(&self, servo: &Servo) -> bool {
+        (self.period_s / servo.period_s - 1.0).abs() < SAME_PERIOD && self.runs.first() == Some(&(0..self.time_s.len()))
+    }
+
     /// The same rows of a motor that moves along other positions, known as far as the measured ones are; nothing else is known of it.
     #[must_use]
     pub fn moving_along(&self, position: &[f64]) -> Observed {
