@@ -39,6 +39,29 @@ pub fn turning_points(position: &[f64], threshold: f64) -> Vec<usize> {
     turns
 }
 
+/// The same positions on their way from turn to turn ([`turning_points`]), which goes one way each: what a sensor wavers by is no way
+/// there and back.
+#[must_use]
+pub fn from_turn_to_turn(position: &[f64], threshold: f64) -> Vec<f64> {
+    let mut way = position.to_vec();
+    let Some(end) = position.len().checked_sub(1) else { return way };
+    let turns = turning_points(position, threshold);
+    let from = std::iter::once(0).chain(turns.iter().copied());
+    let to = turns.iter().copied().chain(std::iter::once(end));
+    for (from, to) in from.zip(to) {
+        // After the last turn the motion may end short of where it got.
+        let up = match turns.as_slice() {
+            [.., before, last] if from == *last => position[*last] < position[*before],
+            [last] if from == *last => position[*last] < position[0],
+            _ => position[to] > position[from],
+        };
+        for row in from + 1..=to {
+            way[row] = if up { way[row].max(way[row - 1]) } else { way[row].min(way[row - 1]) };
+        }
+    }
+    way
+}
+
 /// A travel that noise and grid of this position do not make by themselves, in its unit.
 #[must_use]
 pub fn smallest_travel(position: &[f64]) -> f64 {
@@ -95,6 +118,19 @@ mod tests {
                 assert!(turn.abs_diff(200 * (k + 1)) <= 1, "{turns:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_way_is_that_of_the_motion_whatever_the_noise() {
+        let triangle = |i: i32| f64::from((i % 400 - 200).abs().min(150));
+        let wiggle = |i: i32| 0.4 * f64::from(i * 7919 % 13 - 6) / 6.0;
+        let noisy: Vec<f64> = (0..2000).map(|i| triangle(i) + wiggle(i)).collect();
+        let length = |x: &[f64]| x.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>();
+        let way = from_turn_to_turn(&noisy, 1.0);
+        assert!(way.iter().zip(&noisy).all(|(way, x)| (way - x).abs() < 0.81));
+        let (exact, turns) = (1500.0, 9.0);
+        assert!((length(&way) - exact).abs() < 0.8 * (turns + 1.0), "{}", length(&way));
+        assert!(length(&noisy) > exact + 50.0);
     }
 
     #[test]

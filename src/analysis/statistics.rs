@@ -30,9 +30,13 @@ pub fn deviation(values: &[f64]) -> f64 {
     (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt()
 }
 
-/// Mean of a sample over what that may be off by: over the standard deviation, times √n.
+/// Mean of a sample over what that may be off by: over the standard deviation, times √n; 0 of fewer than two values, which say nothing of
+/// that.
 #[must_use]
 pub fn strength(values: &[f64]) -> f64 {
+    if values.len() < 2 {
+        return 0.0;
+    }
     let n = values.len() as f64;
     values.iter().sum::<f64>() / n * n.sqrt() / deviation(values).max(1e-300)
 }

@@ -88,6 +88,17 @@ pub fn reconcile<'e>(axis: &Axis, found: impl Iterator<Item = &'e mut Effect>) {
     }
 }
 
+/// The same with the standard deviations of the parameters, which grow as the parameters do.
+pub fn reconcile_sure<'e>(axis: &Axis, found: impl Iterator<Item = (&'e mut Effect, &'e mut Vec<f64>)>) {
+    let mut found: Vec<(&mut Effect, &mut Vec<f64>)> = found.collect();
+    let before: Vec<Vec<f64>> = found.iter().map(|(effect, _)| effect.values()).collect();
+    reconcile(axis, found.iter_mut().map(|(effect, _)| &mut **effect));
+    for ((effect, deviations), before) in found.into_iter().zip(before) {
+        let grown = effect.values().into_iter().zip(before).map(|(now, before)| (now / before).abs());
+        deviations.iter_mut().zip(grown).filter(|(_, by)| by.is_finite()).for_each(|(std, by)| *std *= by);
+    }
+}
+
 /// Friction builds up to the level at rest, which is higher by what comes with low speed: over as much more of the way, at the
 /// same stiffness.
 fn of_level(effect: Effect, coulomb: f64, more: f64) -> Effect {

@@ -14,7 +14,7 @@ mod swings;
 use super::filter::{LowPass, convolve, norm, of_three};
 use super::grids;
 use super::many::{decay, to_the_power, weighted_sums, widest};
-use super::rows::{Judged, beside_filled, direction_of, doubtful_rows, judged_rows, resting_rows};
+use super::rows::{Judged, beside_filled, direction_of, doubtful_rows, judged_rows, resting_rows, way_of};
 use super::sampling::{NUMEROV, Sampling};
 use crate::analysis::statistics;
 use crate::machine::{Axis, Belief, Effect};
@@ -80,6 +80,8 @@ pub struct Frame<'a> {
     pub unit: f64,
     /// The filter.
     pub low_pass: LowPass,
+    /// Position from turn to turn, load units: the way that friction is driven by.
+    pub way: Vec<f64>,
     /// Smoothed position, load units.
     pub x: Vec<f64>,
     /// Smoothed speed, load units/s.
@@ -160,6 +162,7 @@ impl<'a> Frame<'a> {
         let a = low_pass.run(&bend, stretches);
         let table_v = columns.table.as_ref().map(|table| low_pass.run(&map_rows(columns, table, speed), stretches));
         let resolution = grid.max(3.0 * scatter).max(1e-12);
+        let gone = way_of(columns, resolution);
         let resting = resting_rows(columns, resolution);
         let direction = direction_of(columns, &v, &a, resolution);
         let sampling = Sampling::of(axis, columns);
@@ -204,6 +207,7 @@ impl<'a> Frame<'a> {
             columns,
             unit,
             low_pass,
+            way: gone,
             x,
             v,
             a,

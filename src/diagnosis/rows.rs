@@ -1,6 +1,7 @@
 //! Where an axis rests, which way it slides, and which rows of a recording can be judged.
 
 use super::frame::Columns;
+use crate::analysis::motion::{from_turn_to_turn, turning_points};
 use crate::plant::noise::Noise;
 use std::ops::Range;
 
@@ -8,6 +9,17 @@ use std::ops::Range;
 const MOST_KEPT: usize = 12_000;
 /// Of how many and more one is taken unevenly.
 const UNEVEN: usize = 3;
+/// How far an axis goes back after a turn that the encoder shows, over the least way that it tells for sure.
+const TURN: f64 = 3.0;
+
+/// The way of an axis from turn to turn, load units: what the encoder wavers by is none.
+pub fn way_of(columns: &Columns, resolution: f64) -> Vec<f64> {
+    let mut way = columns.position.clone();
+    for s in &columns.stretches {
+        way[s.clone()].copy_from_slice(&from_turn_to_turn(&columns.position[s.clone()], TURN * resolution));
+    }
+    way
+}
 
 /// Rows at which the axis rests as far as the encoder can tell: no step for some rows, and no travel around them.
 pub fn resting_rows(columns: &Columns, resolution: f64) -> Vec<bool> {
@@ -66,7 +78,7 @@ pub fn doubtful_rows(columns: &Columns, resting: Vec<bool>, resolution: f64) -> 
     let x = &columns.position;
     let mut doubt: Vec<f64> = resting.into_iter().map(|r| f64::from(u8::from(r))).collect();
     for s in &columns.stretches {
-        for turn in crate::analysis::motion::turning_points(&x[s.clone()], 3.0 * resolution) {
+        for turn in turning_points(&x[s.clone()], TURN * resolution) {
             let turn = s.start + turn;
             let near = |i: usize| (x[i] - x[turn]).abs() < 2.5 * resolution;
             let mut first = turn.saturating_sub(1).max(s.start);

@@ -417,7 +417,8 @@ fn findings(axis: &Axis, bench: &Bench, selection: &Selection, sure: Option<&Sur
             found.extend(said.map(|(effect, std)| (i, share, effect, std)));
         }
     }
-    belief::reconcile(bench.frame.axis, found.iter_mut().map(|(.., effect, _)| effect));
+    let sure = found.iter_mut().map(|(.., effect, deviations)| (effect, deviations));
+    belief::reconcile_sure(bench.frame.axis, sure);
     let whole = belief::extended(axis, &found.iter().map(|(.., effect, _)| *effect).collect::<Vec<_>>());
     found.iter_mut().for_each(|(.., effect, deviations)| belief::at_the_table(&whole, effect, deviations));
     let total = 1.0 - (fit.squares() / empty.squares()).min(1.0);

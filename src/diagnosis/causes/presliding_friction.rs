@@ -78,7 +78,7 @@ pub fn bristle_over(frame: &Frame, displacement: f64) -> Vec<f64> {
 
 /// The state −1…1 at every row, solved exactly over each step, and its change per second; unknown at the start and taken as zero.
 fn build_up(frame: &Frame, displacement: f64, exponent: f64, of_elements: bool) -> [Vec<f64>; 2] {
-    let x = &frame.columns.position;
+    let x = &frame.way;
     let (mut state, mut rate) = (vec![0.0; x.len()], vec![0.0; x.len()]);
     let per_displacement = displacement.recip();
     let mut curve = Curve::new(exponent);

@@ -270,7 +270,7 @@ pub fn built_up(
     level: &[f64],
     more: impl Fn(&mut Friction, usize) -> f64,
 ) -> Vec<f64> {
-    let x = &frame.columns.position;
+    let x = &frame.way;
     let mut dry: Vec<f64> = at_once(frame, level).collect();
     if at_rest.is_plain_bristle() {
         // What a step leaves of the way to the level waits for no other step.
