@@ -8,27 +8,47 @@ use std::iter::Peekable;
 /// Share of a cycle that is none: times are written rounded.
 pub(super) const ROUNDED: f64 = 1e-3;
 
-/// The command at the start of each servo cycle: interpolated between rows, held over rows without one.
+/// The command at the start of each servo cycle: between rows as smooth as an interpolator makes it, by Hermite's cubic, which stands still
+/// where two rows are the same; the same over rows without one.
 pub fn command_of_cycles(time_s: &[f64], command: &[f64], period: f64, cycles: usize) -> impl Iterator<Item = f64> {
     let known = time_s.iter().zip(command).filter(|(_, x)| x.is_finite());
     let mut rows = known.map(|(t, x)| (t - time_s[0], *x));
     let first = rows.next();
-    let (mut now, mut next) = (first, rows.next());
+    let (mut before, mut now, mut next, mut after) = (None, first, rows.next(), rows.next());
     (0..cycles).map(move |cycle| {
         let t = cycle as f64 * period;
-        while let Some(row) = next.filter(|row| row.0 <= t + ROUNDED * period) {
-            (now, next) = (Some(row), rows.next());
+        while next.is_some_and(|row: Row| row.0 <= t + ROUNDED * period) {
+            (before, now, next, after) = (now, next, after, rows.next());
         }
-        let (Some((_, x_first)), Some((t0, x0))) = (first, now) else { return 0.0 };
-        if (t - t0).abs() <= ROUNDED * period {
-            return x0;
+        let (Some((_, x_first)), Some(at)) = (first, now) else { return 0.0 };
+        if (t - at.0).abs() <= ROUNDED * period {
+            return at.1;
         }
         match next {
-            Some((t1, x1)) if t >= t0 => x0 + (x1 - x0) * (t - t0) / (t1 - t0),
+            Some(to) if t >= at.0 => between([before, Some(at), Some(to), after], t),
             Some(_) => x_first,
-            None => x0,
+            None => at.1,
         }
     })
+}
+
+/// When a row was, s, and its command.
+type Row = (f64, f64);
+
+/// The command between the second and the third of four rows, of which the first and the last need not be there.
+fn between([before, at, to, after]: [Option<Row>; 4], t: f64) -> f64 {
+    let slope = |a: Option<Row>, b: Option<Row>| a.zip(b).map(|(a, b)| ((b.1 - a.1) / (b.0 - a.0), b.0 - a.0));
+    let (Some((t0, x0)), Some((mean, long))) = (at, slope(at, to)) else { return 0.0 };
+    // Of the parabola through three rows.
+    let speed = |beside: Option<(f64, f64)>| match beside {
+        Some((beside, its)) if beside != 0.0 && mean != 0.0 => (beside * long + mean * its) / (long + its),
+        Some(_) => 0.0,
+        None => mean,
+    };
+    let [from, into] = [speed(slope(before, at)), speed(slope(to, after))];
+    let share = (t - t0) / long;
+    let left = 1.0 - share;
+    x0 + (t - t0) * (share * mean + left * (from + share * (2.0 * mean - from - into)))
 }
 
 /// What a simulation gives, at the rows of a recording.
@@ -107,13 +127,22 @@ mod tests {
         let time: Vec<f64> = (0..100).map(|i| f64::from(i) * 1e-3).collect();
         let command: Vec<f64> = time.iter().map(|t| t * t).collect();
         assert!(command_of_cycles(&time, &command, 1e-3, 100).eq(command.iter().copied()));
-        // Four cycles a row: between the rows a straight line.
+        // Four cycles a row: between the rows a parabola, but for the ends, beyond which nothing is known.
         let fine: Vec<f64> = command_of_cycles(&time, &command, 0.25e-3, 397).collect();
         assert_eq!(fine.len(), 397);
         for (cycle, x) in fine.iter().enumerate() {
             let t = cycle as f64 * 0.25e-3;
-            assert!((x - t * t).abs() < 0.26e-6, "{cycle}");
+            let least = if (4..392).contains(&cycle) { 1e-12 } else { 0.26e-6 };
+            assert!((x - t * t).abs() < least, "{cycle}");
         }
+    }
+
+    #[test]
+    fn a_command_that_stands_is_not_passed() {
+        let time = [0.0, 1.0, 2.0, 3.0, 4.0];
+        let fine: Vec<f64> = command_of_cycles(&time, &[0.0, 0.0, 2.0, 5.0, 5.0], 0.25, 17).collect();
+        assert!(fine[..5].iter().all(|x| *x == 0.0) && fine[12..].iter().all(|x| *x == 5.0), "{fine:?}");
+        assert!(fine.windows(2).all(|pair| pair[0] <= pair[1]), "{fine:?}");
     }
 
     #[test]
