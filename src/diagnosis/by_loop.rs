@@ -29,6 +29,7 @@ use super::judge::{Excess, LITTLE_LEFT, TOLERABLE_EXCESS, refuted, shows};
 use super::known::Known;
 use super::left::unexplained;
 use super::progress::{Stopped, Watch};
+use super::select::LEAST_STRENGTH;
 use super::show;
 use super::verdict::{Diagnosis, Finding, Verdict, confidence};
 use crate::analysis::statistics;
@@ -59,7 +60,7 @@ const RIVAL: f64 = 0.25;
 /// Share of what is enough that some steps of refining must have taken off for more to be made.
 const HOPE: f64 = 0.25;
 /// Causes that are refined.
-const TRIED: usize = 3;
+const TRIED: usize = 4;
 /// The halves that give a cause its numbers and that judge it.
 const GIVES: Over = Over::Half(0);
 const JUDGES: Over = Over::Half(1);
@@ -234,7 +235,10 @@ fn told(
         refined.insert(usize::from(spring.0 < ALIKE * gain), spring);
     }
     let Some((gain, gained, half)) = refined.first() else { return Ok(None) };
-    let explains = *gain >= enough(JUDGES)
+    let may_be_named =
+        refined.iter().take_while(|other| other.0 > ALIKE * gain).all(|other| other.2.trial.has_a_name());
+    let explains = may_be_named
+        && *gain >= enough(JUDGES)
         && strength(gained, misses, JUDGES) > SURELY
         && half.trial.acts_in_few_rows(frame)
         && !half.trial.is_stopped();
@@ -250,6 +254,9 @@ fn told(
         return Ok(None);
     };
     let Some((effect, deviations)) = whole.effect(frame, extended) else { return Ok(None) };
+    if effect.values()[0].abs() < LEAST_STRENGTH * deviations[0] {
+        return Ok(None);
+    }
     let cause = effect.cause();
     let finding = Finding {
         effect,
@@ -291,7 +298,7 @@ fn promising(
     for (missed, trial) in sized {
         // A clearance whose numbers are not yet right shows nothing, and may be all the same.
         let tried = near.len() < TRIED || trial.law.cause == Cause::Backlash;
-        if tried && near.iter().all(|(_, other)| other.law.cause != trial.law.cause) {
+        if tried && near.iter().all(|(_, other)| !std::ptr::eq(other.law, trial.law)) {
             near.push((missed, trial));
         }
     }
@@ -299,7 +306,7 @@ fn promising(
     let missed = watch
         .each(&siblings, (0.985, 0.99), STAGE, |trial| Some(missed(&replays.error(&trial.on(frame, extended)?)?)))?;
     for (sibling, missed) in siblings.into_iter().zip(missed) {
-        let own = near.iter_mut().find(|(_, own)| own.law.cause == sibling.law.cause);
+        let own = near.iter_mut().find(|(_, own)| std::ptr::eq(own.law, sibling.law));
         if let Some((own, missed)) = own.zip(missed).filter(|(own, missed)| missed < &own.0) {
             *own = (missed, sibling);
         }
@@ -315,8 +322,12 @@ fn promising(
 /// very machine would be, since behind a motor that is known to a step of its encoder a table swings by that step; a part, if it is off by
 /// no more than before; `None` where it gainsays the machine.
 fn by_torque((frame, whole): (&Frame, &Columns), replays: &Replays, [before, with]: [&Axis; 2]) -> Option<Verdict> {
-    let excess = |axis| Excess::of_machine(axis, frame).largest();
-    let (before, after) = (excess(before), excess(with));
+    let [before, after] = [before, with].map(|axis| Excess::of_machine(axis, frame));
+    // What the table does its scale shows.
+    if after.of_channel(1) > before.of_channel(1).max(LITTLE_LEFT) {
+        return None;
+    }
+    let [before, after] = [before, after].map(|excess| excess.largest());
     if after <= LITTLE_LEFT || after <= TOLERABLE_EXCESS && after <= before {
         return Some(Verdict::Explained);
     }

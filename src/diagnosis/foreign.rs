@@ -4,12 +4,14 @@
 
 mod laws;
 
-use super::fit::{Bench, Fit, Part};
+use super::fit::{Bench, Fit, Part, pseudo_inverse};
 use super::judge::{Excess, LITTLE_LEFT, MOST_OF_A_CURVE};
 use super::progress::{Stopped, Watch};
 use super::select::{BELIEF, LEAST_GAIN, NUMBER_PRICE, price};
 use super::shrink::idle_left_out;
+use crate::machine::Cause;
 use laws::{Foreign, LAWS, PLACES};
+use nalgebra::{DMatrix, DVector};
 
 /// Share of what causes explain that a law without a name must stand for, for none of them to be named.
 const MOST: f64 = 0.5;
@@ -89,4 +91,36 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
         }
     }
     Ok(None)
+}
+
+/// Share of what a straight line leaves of table − motor that a bent one must take off it for the scale to be bent at all.
+const BENT: f64 = 0.1;
+/// What a bent line may leave over what the causes leave, to be as good as several of them; and by how much less to be better than one.
+const AS_GOOD: f64 = 1.02;
+const BETTER: f64 = 0.77;
+
+/// How table − motor goes in truth, where a parabola along the stroke (a way that is bent, or rolls under a scale that lies beside it) stands
+/// for an error of pitch and ripples.
+#[must_use]
+pub fn bends_table(bench: &Bench, empty: &Fit, found: &Fit) -> Option<&'static str> {
+    let of_screw = |part: &&Part| matches!(part.law.cause, Cause::ScrewPitchError | Cause::ScrewPeriodicError);
+    let count = found.parts.iter().filter(of_screw).count();
+    let [[_, rest], [_, left]] = [bench.rest(empty), bench.rest(found)];
+    if count == 0 || rest.is_empty() {
+        return None;
+    }
+    let (frame, (low, high)) = (bench.frame, bench.frame.stroke());
+    let place = |row: usize| (2.0 * frame.x[row] - low - high) / (high - low).max(1e-300);
+    let along = |power: i32| frame.kept.iter().map(|&row| place(row).powi(power)).collect::<Vec<f64>>();
+    let left_by = |most: i32| {
+        let powers =
+            DMatrix::from_columns(&(0..=most).map(|power| DVector::from_vec(along(power))).collect::<Vec<_>>());
+        let rest = DVector::from_column_slice(&rest);
+        let normal = pseudo_inverse(powers.transpose() * &powers, 1e-12)?;
+        Some((&rest - &powers * (normal * (powers.transpose() * &rest))).norm_squared())
+    };
+    let (straight, bent) = (left_by(1)?, left_by(2)?);
+    let by_causes = left.iter().map(|left| left * left).sum::<f64>();
+    let stands = bent < if count > 1 { AS_GOOD } else { BETTER } * by_causes;
+    (bent < (1.0 - BENT) * straight && stands).then_some("in table − motor with the square of the way from one place")
 }

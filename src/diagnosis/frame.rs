@@ -8,6 +8,7 @@
 //! taken off before any dead time is looked for.
 
 mod coarse;
+mod colour;
 mod floor;
 mod swings;
 

@@ -3,7 +3,7 @@
 use super::belief;
 use super::frame::{Columns, Frame};
 use super::gain::{Gain, errors, of_both, weight_of_rows};
-use super::judge::{Excess, TOLERABLE_IF_UNTIED};
+use super::judge::beyond_noise;
 use super::progress::{Stopped, Watch};
 use super::sampling::{Sampling, Timing};
 use super::verdict::{Verdict, what_is_missing};
@@ -60,13 +60,12 @@ impl Holdout {
         if !what_is_missing(&frame).is_empty() {
             return None;
         }
-        let beyond = Excess::of_machine(extended, &frame).largest();
-        let note = || {
+        let note = |beyond: f64| {
             format!(
                 "the hold-out leaves {:.1} times its noise, and nothing that the recording shows explains it: something acts there that does not act here; diagnose the hold-out by itself, too",
                 (1.0 + beyond).sqrt()
             )
         };
-        (beyond > TOLERABLE_IF_UNTIED).then(|| (verdict, note()))
+        beyond_noise(extended, &frame).map(|beyond| (verdict, note(beyond)))
     }
 }

@@ -28,7 +28,7 @@ use crate::plant::physics::LEAST_SLOPE;
 pub const TOLERABLE_EXCESS: f64 = 0.6;
 /// The same of what is tied to no coordinate: noise of a current that was filtered over some rows is up to twice what second
 /// differences see of it, and what no move calls up is no machine's doing before that.
-pub const TOLERABLE_IF_UNTIED: f64 = 3.0;
+const TOLERABLE_IF_UNTIED: f64 = 3.0;
 /// Share of the excess that named causes must remove together.
 const LEAST_EXPLAINED: f64 = 0.8;
 /// The same where they leave little, and nothing of the curve that they follow: the floor does not see all that an encoder's grid makes.
@@ -105,7 +105,11 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             (found.fit, found.alike) = (without, Vec::new());
         }
         let Some(mut verdict) = self.explains(&found.fit) else { return Ok(self.too_little(&found)) };
-        if let Some(goes) = foreign::stands_for(self.bench, &self.empty, &found.fit, self.watch)? {
+        let goes = match foreign::bends_table(self.bench, &self.empty, &found.fit) {
+            None => foreign::stands_for(self.bench, &self.empty, &found.fit, self.watch)?,
+            bent => bent,
+        };
+        if let Some(goes) = goes {
             return Ok(Judged { refutation: Some(imitation(&found.fit, goes)), ..self.nothing(&found) });
         }
         found = contact::settled(self.bench, &self.held_out, found, self.watch)?;
@@ -162,11 +166,18 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     /// What held-out rows say of a set of causes by its errors there.
     fn weighed(&self, fit: &Fit, errors: Option<&Errors>, verdict: Verdict) -> Weighed {
         let gains = self.held_out.gains(self.believed.as_ref(), errors);
-        let in_judged_rows = self.held_out.judged_gains(self.believed.as_ref(), errors);
+        let mut in_judged_rows = self.held_out.judged_gains(self.believed.as_ref(), errors);
+        in_judged_rows.extend(gain::of_stretch(self.believed.as_ref(), errors));
         let effects: Vec<Effect> = fit.effects(self.bench.frame).collect();
-        let misleads = verdict == Verdict::PartlyExplained && moves_worse(&in_judged_rows);
-        let fails = misleads || refuted(&in_judged_rows, &effects);
+        let told = self.is_told_by_scale(fit);
+        let fails = misleads(verdict, &in_judged_rows) || refuted_but_for(told, &in_judged_rows, &effects);
         Weighed { gains, in_judged_rows, fails }
+    }
+
+    /// Whether the scale shows that the table goes as a set has it: half of how far it was elsewhere, in amplitude, or more is gone.
+    fn is_told_by_scale(&self, fit: &Fit) -> bool {
+        let [before, after] = [&self.empty, fit].map(|set| Excess::of(self.bench, set, fit).of_channel(1));
+        before > TOLERABLE_EXCESS && after < 0.25 * before
     }
 
     /// Errors of a set on held-out blocks.
@@ -186,7 +197,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     pub fn nothing(&self, found: &Selection) -> Judged {
         let before = Excess::of(self.bench, &self.empty, &found.fit);
         let above = before.largest() > TOLERABLE_EXCESS;
-        let untied = self.may_be_noise(&self.empty, &before);
+        let untied = may_be_noise(self.bench, &self.empty, &before);
         let followed = above && self.is_followed();
         let unknown = above && (followed || !untied);
         Judged {
@@ -216,13 +227,6 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         Judged { nearest, ..nothing }
     }
 
-    /// Whether what a fit leaves above the noise floor may be noise that the floor does not see.
-    fn may_be_noise(&self, fit: &Fit, left: &Excess) -> bool {
-        left.of_channel(1) <= TOLERABLE_EXCESS
-            && left.of_channel(0) <= TOLERABLE_IF_UNTIED
-            && !show::is_tied(self.bench, fit)
-    }
-
     /// How well a set of causes explains the excess; `None` where it does not, or none of them can be named.
     fn explains(&self, fit: &Fit) -> Option<Verdict> {
         let before = Excess::of(self.bench, &self.empty, fit);
@@ -232,7 +236,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let another_curve = is_another_curve(self.bench, &self.empty, fit);
         let least = if lost_motion {
             LEAST_EXPLAINED_LOST_MOTION
-        } else if self.may_be_noise(fit, &after) {
+        } else if may_be_noise(self.bench, fit, &after) {
             LEAST_EXPLAINED_OF_NOISE
         } else if !much_left && !another_curve {
             LEAST_EXPLAINED_OF_LITTLE
@@ -249,6 +253,29 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             Some(Verdict::Explained)
         }
     }
+}
+
+/// Whether what a fit leaves above the noise floor may be noise that the floor does not see.
+fn may_be_noise(bench: &Bench, fit: &Fit, left: &Excess) -> bool {
+    if left.of_channel(1) > TOLERABLE_EXCESS {
+        return false;
+    }
+    let [rest, _] = bench.rest(fit);
+    let coloured = bench.frame.independent_rows(&rest);
+    let rows = coloured.unwrap_or(rest.len() as f64);
+    (coloured.is_some() || left.of_channel(0) <= TOLERABLE_IF_UNTIED) && !show::is_tied(bench, fit, rows)
+}
+
+/// By how much a machine leaves more than noise of a frame; `None` where all may be noise.
+#[must_use]
+pub fn beyond_noise(axis: &Axis, frame: &Frame) -> Option<f64> {
+    let base = belief::base_alone(axis);
+    let frame = frame.believing(&base);
+    let bench = Bench::new(&frame, &Known::of(axis, &frame));
+    let left = bench.fit(Vec::new());
+    let excess = Excess::of(&bench, &left, &left);
+    let noise = excess.largest() <= TOLERABLE_IF_UNTIED || may_be_noise(&bench, &left, &excess);
+    (!noise).then(|| excess.largest())
 }
 
 /// Whether what is explained is mostly a curve over speed, or along the stroke, and is not that curve: too much of it is left.
@@ -271,19 +298,31 @@ fn is_another_curve(bench: &Bench, empty: &Fit, fit: &Fit) -> bool {
 }
 
 /// Whether a machine is no better than the belief: worse in torque and motor position together, and surely so in one of them
-/// or surely better in none. The simulated table carries the motor's error along, with which what the table does may happen to
-/// go. A motor that delivers nothing beyond a level cannot say by its motion how far beyond it was driven: no better torque can
+/// or surely better in none, nor in how far the table is from the motor. The simulated table carries the motor's error along, with which
+/// what the table does may happen to go. A motor that delivers nothing beyond a level cannot say by its motion how far beyond it was driven: no better torque can
 /// be asked of its machine.
 #[must_use]
 pub fn refuted(gains: &[Gain], causes: &[Effect]) -> bool {
+    refuted_but_for(false, gains, causes)
+}
+
+/// The same of a machine that is surely better in something else, or not.
+fn refuted_but_for(better: bool, gains: &[Gain], causes: &[Effect]) -> bool {
     let silent =
         |cause: &Effect| matches!(cause, Effect::TorqueSaturation { slope_ratio, .. } if *slope_ratio < LEAST_SLOPE);
     let silent = causes.iter().any(silent);
-    let motor =
-        || gains.iter().filter(|gain| gain.channel == "position" || !silent && gain.channel != "table_position");
-    let surely_better = silent || gains.iter().any(|gain| gain.ci95[0] > 1.0);
+    let motor = || {
+        gains.iter().filter(|gain| gain.channel == "position" || !silent && !gain.channel.starts_with("table_position"))
+    };
+    let surely_better = silent || better || gains.iter().any(|gain| gain.ci95[0] > 1.0);
     let surely_worse = motor().any(|gain| gain.ci95[1] < 1.0);
     motor().map(|gain| (gain.before / gain.after).ln()).sum::<f64>() < 0.0 && (surely_worse || !surely_better)
+}
+
+/// Whether a machine that leaves much moves worse than the belief by rows that it was not fitted to.
+#[must_use]
+pub fn misleads(verdict: Verdict, gains: &[Gain]) -> bool {
+    verdict == Verdict::PartlyExplained && moves_worse(gains)
 }
 
 /// Whether a machine surely moves worse than the belief under its servo, by what can be seen. What is right as far as it goes may leave

@@ -161,7 +161,7 @@ fn is_tied(bench: &Bench, before: &Fit, after: &Fit) -> bool {
     let rows = 0..bench.rows;
     let held: Vec<f64> =
         before.residual[rows.clone()].iter().zip(&after.residual[rows.clone()]).map(|(b, a)| b - a).collect();
-    let goes = |coordinate: Coordinate| show::share_of(bench.frame, &held, coordinate) > TIED;
+    let goes = |coordinate: Coordinate| show::share_of(bench.frame, &held, coordinate, held.len() as f64) > TIED;
     let frame = bench.frame;
     let speed = |row: usize| frame.v[row].abs();
     let place = |row: usize| frame.x[row];

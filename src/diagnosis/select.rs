@@ -25,6 +25,7 @@ use std::collections::{HashMap, HashSet};
 mod noise;
 mod shelf;
 mod starts;
+mod waves;
 
 use shelf::{Shelf, shelf};
 use starts::{Child, at_best_starts, at_seldom_starts};
@@ -159,6 +160,7 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     let open = idle_left_out(search.bench, search.with_beliefs(&start), search.watch)?;
     let start = if price(&open) < price(&start) { open } else { start };
     let fit = shrink(search.bench, start, search.watch)?;
+    let fit = waves::fewer(search, fit)?;
     let fit = valleys::settled(search.bench, search.laws, fit, search.watch)?;
     let mut fit = play::added(search.bench, search.laws, fit, search.watch)?;
     // What stood in for the play of a spring, or for the spring of a clearance, is not needed beside both.

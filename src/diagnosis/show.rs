@@ -41,6 +41,9 @@ const TIED: f64 = 0.05;
 /// Variance above the noise floor, in units of the floor's, from which on it is said where a residual lives.
 const LITTLE: f64 = 0.5;
 
+/// Standard deviations of what chance puts there that are sure to be more.
+const SURE: f64 = 3.0;
+
 /// How much wider than that of the balance the low-pass is that takes the encoder's noise off the acceleration; odd.
 const SMOOTHER: usize = 5;
 
@@ -101,12 +104,17 @@ pub fn views(bench: &Bench, before: &Fit, after: &Fit) -> Vec<View> {
 /// Two residuals of a channel at the judged rows against every coordinate.
 #[must_use]
 pub fn against_all(frame: &Frame, before: &[f64], after: &[f64]) -> Vec<View> {
+    against(frame, before, after, after.len() as f64)
+}
+
+/// The same where so many of the rows are independent.
+fn against(frame: &Frame, before: &[f64], after: &[f64], independent: f64) -> Vec<View> {
     let grouped = |coordinate: Coordinate| {
         let places = places(frame, coordinate);
         let (a, b) = (Groups::of(&places, before), Groups::of(&places, after));
         let [a_share, b_share] = [(&a, before), (&b, after)].map(|(groups, values)| match coordinate {
-            Coordinate::Acceleration => groups.share().min(share_along_smooth(frame, values)),
-            _ => groups.share(),
+            Coordinate::Acceleration => groups.share(independent).min(share_along_smooth(frame, values, independent)),
+            _ => groups.share(independent),
         });
         let value = |at: f64| if coordinate == Coordinate::SinceReversal { at.exp() } else { at };
         let curve = a.means().zip(b.means()).map(|((at, a), (_, b))| (value(at), a, b)).collect();
@@ -118,7 +126,7 @@ pub fn against_all(frame: &Frame, before: &[f64], after: &[f64]) -> Vec<View> {
             Coordinate::Frequency => {
                 let (a, b) = (periods::spectrum(frame, before), periods::spectrum(frame, after));
                 let curve = a.iter().zip(&b).map(|(a, b)| (a.0, a.1, b.1)).collect();
-                View { coordinate, before: lines(&a, before), after: lines(&b, after), curve }
+                View { coordinate, before: lines(&a, before, independent), after: lines(&b, after, independent), curve }
             }
             _ => grouped(coordinate),
         })
@@ -129,13 +137,13 @@ pub fn against_all(frame: &Frame, before: &[f64], after: &[f64]) -> Vec<View> {
 #[must_use]
 pub fn share_along(bench: &Bench, fit: &Fit, coordinate: Coordinate) -> f64 {
     let [rest, _] = bench.rest(fit);
-    share_of(bench.frame, &rest, coordinate)
+    share_of(bench.frame, &rest, coordinate, rest.len() as f64)
 }
 
-/// The same of values at the judged rows.
+/// The same of values at the judged rows, of which so many are independent.
 #[must_use]
-pub fn share_of(frame: &Frame, values: &[f64], coordinate: Coordinate) -> f64 {
-    Groups::of(&places(frame, coordinate), values).share()
+pub fn share_of(frame: &Frame, values: &[f64], coordinate: Coordinate, independent: f64) -> f64 {
+    Groups::of(&places(frame, coordinate), values).share(independent)
 }
 
 /// Standard deviation of a share of values that go with nothing, of so many rows.
@@ -146,9 +154,9 @@ pub fn chance(rows: f64) -> f64 {
 
 /// Share that goes with the acceleration as far as the encoder's noise is not in that: the balance has the noise as acceleration, with
 /// which the residual goes of itself.
-fn share_along_smooth(frame: &Frame, values: &[f64]) -> f64 {
+fn share_along_smooth(frame: &Frame, values: &[f64], independent: f64) -> f64 {
     let smooth = LowPass { width: SMOOTHER * frame.low_pass.width }.run(&frame.a, &frame.columns.stretches);
-    Groups::of(&frame.kept.iter().map(|&row| smooth[row]).collect::<Vec<f64>>(), values).share()
+    Groups::of(&frame.kept.iter().map(|&row| smooth[row]).collect::<Vec<f64>>(), values).share(independent)
 }
 
 /// Where the judged rows are along a coordinate: distance since reversal by its logarithm, frequency nowhere.
@@ -168,10 +176,12 @@ fn places(frame: &Frame, coordinate: Coordinate) -> Vec<f64> {
     }
 }
 
-/// Whether the torque residual of a fit goes with a coordinate at all.
+/// Whether the torque residual of a fit goes with a coordinate at all, as far as so many independent rows tell.
 #[must_use]
-pub fn is_tied(bench: &Bench, fit: &Fit) -> bool {
-    views(bench, fit, fit).iter().any(|view| view.after > TIED)
+pub fn is_tied(bench: &Bench, fit: &Fit, independent: f64) -> bool {
+    let [rest, _] = bench.rest(fit);
+    let least = TIED.max(SURE * chance(independent));
+    against(bench.frame, &rest, &rest, independent).iter().any(|view| view.after > least)
 }
 
 /// What is left, in a few words; `above` is the variance above the noise floor, in units of the floor's, and `excess` what of it
@@ -220,23 +230,25 @@ impl Groups {
         self.sums.iter().map(|&(at, value, count)| (at / count, value / count))
     }
 
-    fn share(&self) -> f64 {
+    /// Share of the variance that goes with the groups, less what chance puts there where so many values are independent.
+    fn share(&self, independent: f64) -> f64 {
         let (sum, squares, n) = self.total;
         let mean = sum / n;
         let around = (squares - sum * mean).max(1e-300);
         let filled = || self.sums.iter().filter(|group| group.2 > 0.0);
         let between: f64 = filled().map(|&(_, value, count)| count * (value / count - mean).powi(2)).sum();
         let used = filled().count() as f64;
+        let n = independent;
         (1.0 - (1.0 - between / around) * (n - 1.0) / (n - used).max(1.0)).clamp(0.0, 1.0)
     }
 }
 
 /// Share of the variance in the strongest line, less what noise would put there.
-fn lines(spectrum: &[(f64, f64)], rest: &[f64]) -> f64 {
+fn lines(spectrum: &[(f64, f64)], rest: &[f64], independent: f64) -> f64 {
     let n = rest.len() as f64;
     let power = rest.iter().map(|r| r * r).sum::<f64>() / n;
     let strongest = spectrum.iter().map(|(_, amplitude)| 0.5 * amplitude * amplitude).fold(0.0, f64::max);
-    (strongest / power.max(1e-300) - 2.0 * n.ln() / n).clamp(0.0, 1.0)
+    (strongest / power.max(1e-300) - 2.0 * n.ln() / independent).clamp(0.0, 1.0)
 }
 
 /// Travel since the last change of direction, every row.
@@ -264,10 +276,10 @@ mod tests {
     fn the_share_of_groups_is_that_of_the_law_and_chance_has_none() {
         let places: Vec<f64> = (0..4000).map(|i| f64::from(i * 7919 % 4000)).collect();
         let law: Vec<f64> = places.iter().map(|x| (x / 700.0).sin()).collect();
-        assert!(Groups::of(&places, &law).share() > 0.98);
+        assert!(Groups::of(&places, &law).share(4e3) > 0.98);
         let chance: Vec<f64> = (0..4000_u32).map(|i| f64::from(i.wrapping_mul(2_654_435_761) >> 16)).collect();
-        assert!(Groups::of(&places, &chance).share() < 0.02);
+        assert!(Groups::of(&places, &chance).share(4e3) < 0.02);
         // All at one place: nothing goes with it.
-        assert_eq!(Groups::of(&vec![1.0; 4000], &law).share(), 0.0);
+        assert_eq!(Groups::of(&vec![1.0; 4000], &law).share(4e3), 0.0);
     }
 }

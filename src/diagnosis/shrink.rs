@@ -2,7 +2,7 @@
 //! coefficients are fitted without a block and judged on it), and what is too small to be known.
 
 use super::blocks;
-use super::fit::{Bench, Fit};
+use super::fit::{Bench, Fit, Part};
 use super::form;
 use super::grids;
 use super::progress::{Stopped, Watch};
@@ -20,6 +20,10 @@ const MOST_IN_A_BLOCK: f64 = 0.125;
 /// Least share of the variance that causes explain where a cause acts: a thirtieth in amplitude. No law holds more exactly on a
 /// machine.
 const LEAST_SHARE: f64 = 0.001;
+
+/// Size over its standard deviation from which on what was found at the best of many periods or places is there: of some 300 that hold
+/// nothing the largest is that large once in a hundred times, √(2·ln(300/0.01)).
+const LEAST_OF_MANY: f64 = 4.5;
 
 /// Drops causes that the others do without as they are, weakest first: refined, the others would do without them all the more.
 ///
@@ -90,10 +94,12 @@ fn slight(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
 /// The part of which least is known that it is there at all. What halves the rest of a channel is there, however little is
 /// known of its size: a law that is not quite the machine's leaves much, by which its size is uncertain.
 fn doubtful(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
+    let least = |part: &Part| if part.law.cause.row().repeatable { LEAST_OF_MANY } else { LEAST_STRENGTH };
     let strengths = uncertainty::strengths(bench, fit);
+    let strengths: Vec<f64> = strengths.iter().zip(&fit.parts).map(|(own, part)| own / least(part)).collect();
     let open = (0..strengths.len()).filter(|&i| !fit.halves(&without[i]));
     let weakest = open.min_by(|&a, &b| strengths[a].total_cmp(&strengths[b]))?;
-    (strengths[weakest] < LEAST_STRENGTH).then_some(weakest)
+    (strengths[weakest] < 1.0).then_some(weakest)
 }
 
 /// Whether held-out blocks bear out what `full` gains over `less`.

@@ -12,7 +12,7 @@ use super::fit::{Bench, Fit};
 use super::frame::{Columns, Frame};
 use super::gain::{Gain, Replay};
 use super::holdout::Holdout;
-use super::judge::{Judge, Judged, refutation, refuted, shows};
+use super::judge::{Judge, Judged, misleads, refutation, refuted, shows};
 use super::known::Known;
 use super::left::{Left, Unexplained, unexplained};
 use super::low_limit;
@@ -279,7 +279,8 @@ fn answer_on(
                 let [gains, in_judged_rows] = rows.gains(axis, &extended, watch)?;
                 judged.gains = gains;
                 let effects: Vec<Effect> = findings.iter().map(|f| f.effect).collect();
-                if shows(&in_judged_rows) && refuted(&in_judged_rows, &effects) {
+                let fails = misleads(judged.verdict, &in_judged_rows) || refuted(&in_judged_rows, &effects);
+                if shows(&in_judged_rows) && fails {
                     let causes = findings.iter().map(|f| f.effect.cause());
                     notes.push(refutation(causes, &in_judged_rows, "the hold-out"));
                     judged = judge.nothing(&judged.selection);
@@ -417,8 +418,7 @@ fn findings(axis: &Axis, bench: &Bench, selection: &Selection, sure: Option<&Sur
             found.extend(said.map(|(effect, std)| (i, share, effect, std)));
         }
     }
-    let sure = found.iter_mut().map(|(.., effect, deviations)| (effect, deviations));
-    belief::reconcile_sure(bench.frame.axis, sure);
+    belief::reconcile_sure(bench.frame.axis, found.iter_mut().map(|(.., effect, std)| (effect, std)));
     let whole = belief::extended(axis, &found.iter().map(|(.., effect, _)| *effect).collect::<Vec<_>>());
     found.iter_mut().for_each(|(.., effect, deviations)| belief::at_the_table(&whole, effect, deviations));
     let total = 1.0 - (fit.squares() / empty.squares()).min(1.0);

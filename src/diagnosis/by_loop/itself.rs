@@ -34,7 +34,7 @@ const LOOKS: usize = 3;
 /// What is said of it.
 const SAYS: &str = "what is left is no more than a recording of this very machine would leave behind an encoder of this grid and noise";
 
-/// What a machine leaves of the torque of a recording: mean square, that of noise, what goes with each of [`WHERE`], and judged rows.
+/// What a machine leaves of the torque of a recording: mean square, that of noise, what goes with each of [`WHERE`], and independent rows.
 struct Leaves {
     squares: f64,
     noise: f64,
@@ -50,8 +50,9 @@ impl Leaves {
         let certain = &left.residual[..bench.rows];
         let squares = bench.certain_rms(&left)[0].powi(2);
         let noise = frame.floor(&bench.rest(&left)[0], true).powi(2);
-        let goes_with = WHERE.map(|coordinate| squares * show::share_of(frame, certain, coordinate));
-        Self { squares, noise, goes_with, rows: bench.rows as f64 }
+        let rows = frame.independent_rows(certain).unwrap_or(bench.rows as f64);
+        let goes_with = WHERE.map(|coordinate| squares * show::share_of(frame, certain, coordinate, rows));
+        Self { squares, noise, goes_with, rows }
     }
 }
 

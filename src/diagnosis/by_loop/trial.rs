@@ -2,7 +2,7 @@
 
 use super::replays::{Over, Replays};
 use crate::diagnosis::belief;
-use crate::diagnosis::causes::presliding_friction::{BRISTLE, OF_ANY_EXPONENT};
+use crate::diagnosis::causes::presliding_friction::{BRISTLE, OF_ANY_EXPONENT, WITHIN_STEPS};
 use crate::diagnosis::causes::table_side::{split, swing_of};
 use crate::diagnosis::causes::{Law, Resistance, Rest, Scale, law};
 use crate::diagnosis::fit::pseudo_inverse;
@@ -42,6 +42,8 @@ const LITTLE: f64 = 3e-3;
 /// Times its velocity up to which friction that rises at low speed acts, and the share of the judged rows that are few.
 const TWICE: f64 = 2.0;
 const FEW_ROWS: f64 = 0.1;
+/// Steps of the encoder within which friction may build up and not be known to.
+const WITHIN: [f64; 3] = [0.2, 0.5, 1.2];
 /// Share of a block that stays where it alone knows of something.
 const MOST_LEFT_OUT: f64 = 0.95;
 
@@ -103,7 +105,12 @@ pub fn starts(frame: &Frame, law: &'static Law) -> Vec<Trial> {
             let bristles = all().into_iter().filter(|shape| shape[1..] == BRISTLE).step_by(2);
             let trial =
                 |shape| Trial { law: &OF_ANY_EXPONENT, ..trial(shape, vec![frame.belief.coulomb, 0.0], false, false) };
-            bristles.map(trial).collect()
+            let level = [frame.belief.coulomb, 0.0];
+            let within = WITHIN.map(|steps| [&[steps * 1e3 * frame.grid][..], &BRISTLE].concat());
+            let within = within.into_iter().filter(|shape| shape[0] > 0.0);
+            let unseen =
+                |shape| Trial { law: &WITHIN_STEPS, shape, coefficients: level.to_vec(), open: false, linear: false };
+            bristles.map(trial).chain(within.map(unseen)).collect()
         }
         Backlash => {
             let mut shapes = all();
@@ -183,6 +190,12 @@ impl Trial {
             }
             _ => Vec::new(),
         }
+    }
+
+    /// Whether it may be named: what builds up within the steps of the encoder may not.
+    #[must_use]
+    pub fn has_a_name(&self) -> bool {
+        !std::ptr::eq(self.law, &WITHIN_STEPS)
     }
 
     /// Whether it acts in few rows, so that the low-pass of the torque hides it. What acts in proportion to a number does so in all, but for

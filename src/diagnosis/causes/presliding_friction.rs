@@ -10,6 +10,15 @@ use crate::plant::friction::{Curve, Elements};
 /// coefficient is that times τ. Parameters: d in thousandths of the load's unit, n, and 0 for a bristle or 1 for elements.
 pub static LAW: Law = with_exponent(&[DISPLACEMENT, Scale::Choice, Scale::Choice]);
 
+/// The same over less than an encoder tells: in the loop it is a rival of what is found there, and never named.
+pub static WITHIN_STEPS: Law = Law {
+    effect: |_, shape, _| {
+        let [displacement_um, exponent, maxwell_slip] = shape.try_into().ok()?;
+        Some(Effect::PreslidingFriction { displacement_um, exponent, maxwell_slip, micro_damping_s: 0.0 })
+    },
+    ..with_exponent(&[DISPLACEMENT, Scale::Choice, Scale::Choice])
+};
+
 /// The same with n refined: see `formulation`.
 pub static OF_ANY_EXPONENT: Law = with_exponent(&[DISPLACEMENT, Scale::Linear(0.0, 2.5, 0.05), Scale::Choice]);
 
