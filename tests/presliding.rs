@@ -74,25 +74,36 @@ fn dahl(exponent: f64) -> impl FnMut(f64) -> f64 {
     }
 }
 
-/// 30 s at 1 kHz along waves, grid 0.1 µm, noise 0.4 N.
-fn recording(waves: [(f64, f64); 2], mut friction: impl FnMut(f64) -> f64) -> Recording {
+/// 30 s at 1 kHz along waves.
+fn recording(waves: [(f64, f64); 2], friction: impl FnMut(f64) -> f64) -> Recording {
     let sum = |of: &dyn Fn(f64, f64) -> f64| waves.iter().map(|(size, w)| of(*size, *w)).sum::<f64>();
-    let place = |t: f64| sum(&|size, w| size * (w * t).sin());
+    let motion = |t: f64| {
+        [
+            sum(&|size, w| size * (w * t).sin()),
+            sum(&|size, w| size * w * (w * t).cos()),
+            sum(&|size, w| -size * w * w * (w * t).sin()),
+        ]
+    };
+    recorded(motion, 0.0, friction)
+}
+
+/// 30 s at 1 kHz along a motion (mm and s), encoder grid 0.1 µm and noise in mm, torque noise 0.4 N.
+fn recorded(motion: impl Fn(f64) -> [f64; 3], encoder: f64, mut friction: impl FnMut(f64) -> f64) -> Recording {
     let mut seed = 11u64;
     let mut noise = || {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 12f64.sqrt()
     };
     let [mut time, mut position, mut force] = [Vec::new(), Vec::new(), Vec::new()];
-    let (mut last, mut held) = (place(0.0), 0.0);
+    let (mut last, mut held) = (motion(0.0)[0], 0.0);
     for row in 0..30_000 {
         let t = f64::from(row) * 1e-3;
-        let (v, a) = (sum(&|size, w| size * w * (w * t).cos()), sum(&|size, w| -size * w * w * (w * t).sin()));
+        let [_, v, a] = motion(t);
         time.push(t);
-        position.push((last * 1e4).round() * 1e-4);
+        position.push(((last + encoder * noise()) * 1e4).round() * 1e-4);
         force.push(40.0 * a * 1e-3 + 60.0 * v * 1e-3 + held + 0.4 * noise());
         for k in 1..=200 {
-            let x = place(t + f64::from(k) * STEP_S);
+            let [x, ..] = motion(t + f64::from(k) * STEP_S);
             held = friction(x - last);
             last = x;
         }
@@ -101,10 +112,29 @@ fn recording(waves: [(f64, f64); 2], mut friction: impl FnMut(f64) -> f64) -> Re
         .unwrap()
 }
 
+/// Moves of 0.8 s there and back, each a little longer than the last, with rests of 0.7 s between.
+fn with_rests(t: f64) -> [f64; 3] {
+    let (count, within) = ((t / 1.5).floor(), t % 1.5);
+    let (way, side) = (30.0 + count, if count % 2.0 == 0.0 { 1.0 } else { -1.0 });
+    let from = if side > 0.0 { -0.5 * (30.0 + count - 1.0) } else { 0.5 * (30.0 + count - 1.0) };
+    let way = side * 0.5 * (way + 30.0 + count - 1.0);
+    let s = (within / 0.8).min(1.0);
+    [
+        from + way * s.powi(3) * (10.0 - 15.0 * s + 6.0 * s * s),
+        way * 30.0 * (s * (1.0 - s)).powi(2) / 0.8,
+        way * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / 0.64,
+    ]
+}
+
 /// The finding, which is alone and holds the true displacement in its 95 %.
 fn found_along(waves: [(f64, f64); 2], friction: impl FnMut(f64) -> f64) -> Finding {
+    found_by(&recording(waves, friction))
+}
+
+/// The same of a recording.
+fn found_by(recording: &Recording) -> Finding {
     let axis: Axis = Machine::parse(MACHINE).unwrap().axes.remove(0);
-    let d = diagnose(&axis, &Excerpt::of(&recording(waves, friction), &axis), None, &|_, _| true).unwrap();
+    let d = diagnose(&axis, &Excerpt::of(recording, &axis), None, &|_, _| true).unwrap();
     let named: Vec<Cause> = d.findings.iter().map(|f| f.effect.cause()).collect();
     assert_eq!((d.verdict, named.as_slice()), (Verdict::Explained, &[Cause::PreslidingFriction][..]), "{d:?}");
     let finding = d.findings[0].clone();
@@ -129,6 +159,14 @@ fn a_bristle_with_and_without_damping_keeps_its_stiffness() {
         assert_eq!((exponent, maxwell_slip), (1.0, 0.0));
         assert!((micro_damping_s - damping_s).abs() < 3e-4, "{micro_damping_s} s for {damping_s}");
     }
+}
+
+/// An encoder that wavers at rest moves no bristle: over its steps to and fro one would creep back, and elements would not.
+#[test]
+fn what_an_encoder_wavers_by_is_no_way() {
+    let finding = found_by(&recorded(with_rests, 4e-4, dahl(1.0)));
+    let Effect::PreslidingFriction { displacement_um, maxwell_slip, .. } = finding.effect else { unreachable!() };
+    assert!(maxwell_slip == 0.0 && (displacement_um * 1e-3 / DISPLACEMENT - 1.0).abs() < 0.05, "{finding:?}");
 }
 
 #[test]

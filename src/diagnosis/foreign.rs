@@ -5,7 +5,7 @@
 mod laws;
 
 use super::fit::{Bench, Fit, Part, pseudo_inverse};
-use super::judge::{Excess, LITTLE_LEFT, MOST_OF_A_CURVE};
+use super::judge::{Excess, LITTLE_LEFT, MOST_OF_A_CURVE, is_coloured};
 use super::progress::{Stopped, Watch};
 use super::select::{BELIEF, LEAST_GAIN, NUMBER_PRICE, price};
 use super::shrink::idle_left_out;
@@ -48,7 +48,8 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
         tried.max_by(|a, b| a.0.total_cmp(&b.0))
     };
     // A law of few numbers that does is what is there; one of any form is asked where something is left, or much was needed.
-    let open = found.parts.len() > FEW || Excess::of(bench, found, found).largest() > LITTLE_LEFT;
+    let left = || Excess::of(bench, found, found).largest() > LITTLE_LEFT && !is_coloured(bench, found);
+    let open = found.parts.len() > FEW || left();
     let mut laws: Vec<&'static Foreign> = LAWS.iter().filter(|law| open || !law.takes_any_form()).collect();
     // What takes longest is begun first.
     laws.sort_by_key(|law| !law.somewhere);

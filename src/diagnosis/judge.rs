@@ -234,9 +234,10 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let lost_motion = fit.parts.iter().any(|p| p.law.cause == Cause::Backlash);
         let much_left = after.largest() > LITTLE_LEFT;
         let another_curve = is_another_curve(self.bench, &self.empty, fit);
+        let noise = may_be_noise(self.bench, fit, &after);
         let least = if lost_motion {
             LEAST_EXPLAINED_LOST_MOTION
-        } else if may_be_noise(self.bench, fit, &after) {
+        } else if noise {
             LEAST_EXPLAINED_OF_NOISE
         } else if !much_left && !another_curve {
             LEAST_EXPLAINED_OF_LITTLE
@@ -247,7 +248,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         let nameless = fit.effects(self.bench.frame).next().is_none();
         if nameless || too_little || much_left && another_curve {
             None
-        } else if much_left {
+        } else if much_left && !(noise && is_coloured(self.bench, fit)) {
             Some(Verdict::PartlyExplained)
         } else {
             Some(Verdict::Explained)
@@ -264,6 +265,13 @@ fn may_be_noise(bench: &Bench, fit: &Fit, left: &Excess) -> bool {
     let coloured = bench.frame.independent_rows(&rest);
     let rows = coloured.unwrap_or(rest.len() as f64);
     (coloured.is_some() || left.of_channel(0) <= TOLERABLE_IF_UNTIED) && !show::is_tied(bench, fit, rows)
+}
+
+/// Whether what a fit leaves of the torque is noise of the first order.
+#[must_use]
+pub fn is_coloured(bench: &Bench, fit: &Fit) -> bool {
+    let [rest, _] = bench.rest(fit);
+    bench.frame.independent_rows(&rest).is_some()
 }
 
 /// By how much a machine leaves more than noise of a frame; `None` where all may be noise.
