@@ -210,6 +210,7 @@ static void see_command(homing_adversary *a, const gib_homing_input *in)
     double speed = fastest + given(g->acceleration_mm_s2, 50.0) * g->cycle_s;
     int may_jump = o->stop_drive || b->phase == GIB_HOMING_LIMIT ||
                    (o->new_events & (GIB_HOMING_EVENT_CLEAR_REQUESTED | GIB_HOMING_EVENT_CLEARED)) != 0;
+    law(a, homing_brakes(g, b, o, a->world.plant.c.motors), "braking from the speed before");
     for (int i = 0; i < a->world.plant.c.motors; i++) {
         double target = o->target_position_mm[i];
         law(a, isfinite(target) && isfinite(o->target_speed_mm_s[i]), "a command that is a number");

@@ -34,6 +34,7 @@ int32_t homing_world_start(homing_world *w, const homing_plant_config *c, const 
 void homing_world_step(homing_world *w)
 {
     const gib_homing_input *in = homing_plant_cycle(&w->plant);
+    w->before = w->plant.out;
     w->status = gib_homing_step(homing_world_gib(w), in, &w->plant.out);
     w->touches += w->plant.out.phase == GIB_HOMING_TOUCH && w->phase != GIB_HOMING_TOUCH;
     w->phase = w->plant.out.phase;
@@ -72,6 +73,18 @@ int homing_way_out(const gib_homing_config *g)
     return (int)(seconds / g->cycle_s) + 40;
 }
 
+int homing_brakes(const gib_homing_config *g, const gib_homing_output *before, const gib_homing_output *now, int motors)
+{
+    double change = given(g->acceleration_mm_s2, 50.0) * g->cycle_s;
+    int all = 1;
+    for (int i = 0; i < motors && now->phase == GIB_HOMING_STOPPING; i++) {
+        double moved = now->target_position_mm[i] - before->target_position_mm[i], speed = now->target_speed_mm_s[i];
+        all &= fabs(speed - before->target_speed_mm_s[i]) <= 1.5 * change + 1e-9;
+        all &= fabs(moved / g->cycle_s - speed) <= change + 1e-9;
+    }
+    return all;
+}
+
 /* The first bound that is broken in this cycle, or NULL. */
 static const char *broken(const homing_world *w, homing_fault fault)
 {
@@ -89,6 +102,9 @@ static const char *broken(const homing_world *w, homing_fault fault)
         if (!isfinite(o->target_position_mm[i]) || !isfinite(o->target_speed_mm_s[i])) {
             return "command";
         }
+    }
+    if (!homing_brakes(&w->config, &w->before, o, p->c.motors)) {
+        return "braking";
     }
     return NULL;
 }

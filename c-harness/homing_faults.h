@@ -30,6 +30,7 @@ typedef struct {
     gib_homing_config config;
     int32_t status;
     int cycles, touches, phase;
+    gib_homing_output before; /* what gib asked for in the cycle before the last */
     _Alignas(16) unsigned char memory[80 * 1024]; /* of the gib_homing */
 } homing_world;
 
@@ -54,6 +55,9 @@ gib_homing *homing_world_gib(homing_world *w);
 homing_branch homing_world_break(homing_world *w, homing_fault fault);
 /* Cycles that the way out takes at most, as the documentation states it. */
 int homing_way_out(const gib_homing_config *g);
+/* Whether commands that brake go on from the speed of the cycle before, no harder than the acceleration allows. The last cycle of a
+ * stop takes up to half as much more. */
+int homing_brakes(const gib_homing_config *g, const gib_homing_output *before, const gib_homing_output *now, int motors);
 /* Whether `status` is a right answer to `fault`; `first`: what had already been said. */
 int homing_names(homing_fault fault, int32_t first, const homing_branch *b);
 

@@ -106,6 +106,17 @@ static void output_is_safe(const gib_backlash_output *out, const gib_backlash_ou
     if (before->owns_motion && out->owns_motion) {
         assert_true(fabs(out->target_position_mm - before->target_position_mm) <= 5.0e-3 + 1e-9);
     }
+    /* Braking goes on from the speed of the cycle before; the last cycle of a stop takes up to half as much more. */
+    if (out->phase == GIB_BACKLASH_STOPPING) {
+        const double cycle_s = 0.001, change = 50.0 * cycle_s;
+        double moved = out->target_position_mm - before->target_position_mm;
+        assert_true(fabs(out->target_speed_mm_s - before->target_speed_mm_s) <= 1.5 * change + 1e-9);
+        assert_true(fabs(moved / cycle_s - out->target_speed_mm_s) <= change + 1e-9);
+    }
+    /* A drive that follows no command is asked for no motion. */
+    if (out->message == GIB_ERR_DRIVE_FAULT && before->owns_motion && out->owns_motion) {
+        assert_true(out->target_position_mm == before->target_position_mm && out->target_speed_mm_s == 0.0);
+    }
 }
 
 /* Follows a fork from the fault to its end and checks what is left behind. */

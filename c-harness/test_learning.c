@@ -329,6 +329,32 @@ static void what_is_learnt_is_kept_in_a_file(void **state)
     unlink(broken);
 }
 
+/* Without an input the command is the last one, and what is said of it is what is in it; then all goes on. */
+static void a_step_without_input_says_what_is_in_the_command(void **state)
+{
+    (void)state;
+    for (int method = 0; method < 2; method++) {
+        gib_learning_config g = usual(method);
+        rig *r = rig_start(&g);
+        int32_t status = GIB_BUSY;
+        double most = 0.0;
+        for (int i = 0; i < 200000 && status == GIB_BUSY; i++) {
+            status = rig_cycle(r, NULL);
+            if (i % 7 == 3) {
+                gib_learning_output out;
+                memset(&out, 0xee, sizeof out);
+                assert_int_equal(gib_learning_step(r->gib, NULL, &out), GIB_ERR_NULL);
+                assert_true(out.command_mm == r->out.command_mm);
+                assert_true(fabs(out.correction_um - r->out.correction_um) < 1e-6);
+                most = fmax(most, fabs(out.correction_um));
+            }
+        }
+        assert_int_equal(status, GIB_DONE);
+        assert_true(most > 10.0 && rig_rms(r) < 0.5);
+        rig_end(r);
+    }
+}
+
 static void pointers_and_handles_are_checked(void **state)
 {
     (void)state;
@@ -374,6 +400,7 @@ int main(void)
         cmocka_unit_test(the_spindle_may_stop_turn_back_and_change_speed),
         cmocka_unit_test(an_abort_in_any_cycle_takes_the_correction_out),
         cmocka_unit_test(what_is_learnt_is_kept_in_a_file),
+        cmocka_unit_test(a_step_without_input_says_what_is_in_the_command),
         cmocka_unit_test(pointers_and_handles_are_checked),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -166,6 +166,31 @@ static void variation_every_fault_in_every_cycle(void **state)
     print_table("speed variation", VARIATION_STATES, 1, 4, VARIATION_NAMES, VARIATION_CODES, rows, VARIATION_FAULTS);
 }
 
+/* A fault in the first cycle: the speed asked for goes on, or, where that is no number, the last one within the limits, else the mean. */
+static void variation_broken_at_once_does_not_stop_the_spindle(void **state)
+{
+    (void)state;
+    for (int run = 0; run < 3 * VARIATION_FAULTS; run++) {
+        int fault = run / 3, fresh = run % 3 == 0;
+        variation_run now;
+        gib_speed_variation *gib = NULL;
+        gib_speed_variation_config c = variation_config(GIB_SPEED_VARIATION_TRIANGLE);
+        gib_speed_variation_input before = {run % 3 == 1 ? 1100.0 : 0.0, 0.0, 0.0, 0.0, 0, 0};
+        memset(&now, 0, sizeof now);
+        assert_int_equal(gib_speed_variation_init_in(now.memory, sizeof now.memory, &gib), GIB_OK);
+        if (!fresh) {
+            assert_int_equal(gib_speed_variation_step(gib, &before, &now.out), GIB_OK);
+        }
+        assert_int_equal(gib_speed_variation_start(gib, &c), GIB_OK);
+        assert_int_equal(variation_cycle(&now, &c, fault, 1, 0), VARIATION_CODES[fault]);
+        int unsaid = fault == SPEED_ASKED_NAN || fault == SPEED_ASKED_INFINITE, other = fault == SPEED_OTHER_SENSE;
+        double asked = fault == SPEED_TOO_HIGH ? 1.7 * c.speed_rpm : fault == SPEED_TOO_LOW ? 0.3 * c.speed_rpm : c.speed_rpm;
+        double command = unsaid && run % 3 == 1 ? before.speed_rpm : other ? -asked : asked;
+        assert_true(fabs(now.out.speed_command_rpm - command) < 1e-9 * fabs(command));
+        assert_true(now.out.torque_nm == 0.0);
+    }
+}
+
 /* Speed, amplitude, period and cutting change in every cycle, at random, and the command stays within the motor. */
 static void variation_everything_changes_in_every_cycle(void **state)
 {
@@ -238,6 +263,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(variation_every_fault_in_every_cycle),
+        cmocka_unit_test(variation_broken_at_once_does_not_stop_the_spindle),
         cmocka_unit_test(variation_everything_changes_in_every_cycle),
         cmocka_unit_test(variation_that_cannot_come_back_ends),
     };

@@ -373,6 +373,32 @@ static void no_cycle_meets_a_subnormal_number(void **state)
 #endif
 }
 
+/* Without an input the position is the last one, and what is said of it is what is in it. */
+static void a_step_without_input_says_what_is_in_the_position(void **state)
+{
+    (void)state;
+    for (int method = 0; method < 2; method++) {
+        rig *r = rig_start(method);
+        double most = 0.0;
+        for (int i = 0; i < 9000; i++) {
+            if (i == 8900) {
+                gib_vibration_abort(r->gib);
+            }
+            rig_cycle(r, NULL);
+            if (i % 7 == 3) {
+                gib_vibration_output out;
+                memset(&out, 0xee, sizeof out);
+                assert_int_equal(gib_vibration_step(r->gib, NULL, &out), GIB_ERR_NULL);
+                assert_true(out.position_mm == r->out.position_mm);
+                assert_true(out.correction_um == r->out.correction_um);
+                most = fmax(most, fabs(out.correction_um));
+            }
+        }
+        assert_true(most > 1.0);
+        rig_end(r);
+    }
+}
+
 static void pointers_and_handles_are_checked(void **state)
 {
     (void)state;
@@ -422,6 +448,7 @@ int main(void)
         cmocka_unit_test(an_abort_in_any_cycle_fades_to_the_scale),
         cmocka_unit_test(the_past_is_forgotten),
         cmocka_unit_test(no_cycle_meets_a_subnormal_number),
+        cmocka_unit_test(a_step_without_input_says_what_is_in_the_position),
         cmocka_unit_test(pointers_and_handles_are_checked),
     };
     return cmocka_run_group_tests(tests, calibrate, NULL);

@@ -4564,6 +4564,10 @@ int32_t gib_backlash_start(struct gib_backlash *handle,
  * instant. When `request_id` changes, put `compensation_um` and `reversal_acceleration_off` in force and report the
  * number in `acknowledged_id` and the amount in force in `compensation_um`.
  *
+ * A fault is named in `message` in the cycle in which it is found. In that cycle the command already brakes from its own last
+ * speed, no harder than `acceleration_mm_s2`, whatever is measured; with GIB_INPUT_FAULT, when the axis follows no command, it stays
+ * where it is. Then everything changed is restored; while that goes on the status is GIB_BUSY, and only then the error.
+ *
  * @param handle the instance.
  * @param input measured values of this cycle.
  * @param output commands for this cycle; always written when not NULL.
@@ -4960,7 +4964,7 @@ int32_t gib_diagnosis_result(const struct gib_diagnosis *handle,
 /**
  * The diagnosis as JSON with schema "gib.diagnosis/1".
  *
- * Ask for the size first: `gib_diagnosis_json(handle, NULL, 0, &needed)`.
+ * Ask for the size first: `gib_diagnosis_json(handle, NULL, 0, &needed)` returns GIB_ERR_BUFFER and sets `needed`.
  *
  * @param handle the instance.
  * @param json receives the text, UTF-8, with its NUL; NULL to ask for the size alone.
@@ -5099,7 +5103,8 @@ int32_t gib_homing_start(struct gib_homing *handle,
  * `torque_limit` the limit in force. Take the torque off the motors while `stop_drive` is 1: that is at once where the torque is more
  * than the limit allows (GIB_ERR_TORQUE_BOUND), since a drive that does not keep to it would press on while it brakes.
  *
- * A fault is named in `message` in the cycle in which it is found. Then gib brakes, goes back from what is pressed on, and gives the
+ * A fault is named in `message` in the cycle in which it is found. From that cycle on gib brakes from the speed commanded last, no
+ * harder than `acceleration_mm_s2`, unless it stops the drive; then it goes back from what is pressed on, and gives the
  * old torque limit back; while that goes on the status is GIB_BUSY, and only then the error. It takes at most, in seconds:
  * 5·(speed + approach speed) ÷ acceleration, (lag limit + `press_max_mm`) ÷ approach speed, four detection times and twice
  * `ack_timeout_s`, together.
@@ -5374,7 +5379,7 @@ int32_t gib_learning_start(struct gib_learning *handle,
  * GIB_ERR_LEARNING_GROWS and GIB_ERR_LEARNING_UPDATES with the best correction in force; GIB_ERR_LEARNING_DEVIATION,
  * GIB_ERR_ABORTED, GIB_ERR_DRIVE_FAULT, GIB_ERR_DEADLINE (the spindle did not turn, or nothing was detected, for `wait_s`)
  * and GIB_ERR_NON_FINITE (the target is no number: the last command is repeated meanwhile) with none; and GIB_ERR_NULL,
- * GIB_ERR_HANDLE of this call.
+ * GIB_ERR_HANDLE of this call. Where `input` is NULL the last command is repeated, and `correction_um` is what is in it.
  *
  * [thread: cycle] [real-time: yes] [state: any]
  *
@@ -5417,7 +5422,7 @@ int32_t gib_learning_result(const struct gib_learning *handle, struct gib_learni
  * Reads target, command and detected position over the spindle's angle.
  *
  * @param handle the instance.
- * @param points receives them, from -180 degrees on; may be NULL to learn the count.
+ * @param points receives them, from -180 degrees on; NULL with `capacity` 0 to learn the count, by GIB_ERR_BUFFER unless it is 0.
  * @param capacity points that fit at `points`.
  * @param count receives how many there are.
  * @return GIB_OK; GIB_ERR_BUFFER when there are more than fit, GIB_ERR_NULL, GIB_ERR_HANDLE.
@@ -5553,7 +5558,7 @@ int32_t gib_machine_save(struct gib_machine *handle,
 /**
  * The machine as JSON with schema "gib.machine/1".
  *
- * Ask for the size first: `gib_machine_result(handle, NULL, 0, &needed)`.
+ * Ask for the size first: `gib_machine_result(handle, NULL, 0, &needed)` returns GIB_ERR_BUFFER and sets `needed`.
  *
  * @param handle the instance.
  * @param json receives the text, UTF-8, with its NUL; NULL to ask for the size alone.
@@ -5991,7 +5996,8 @@ int32_t gib_speed_variation_start(struct gib_speed_variation *handle,
  * each: it takes effect within 20 cycles, and until then the variation goes on as before. Cutting torque counts at once.
  *
  * A fault is named in `message` in its cycle; the speed then goes back to its mean as after GIB_SPEED_VARIATION_STOP, with status
- * GIB_BUSY, and only then the error is returned. After a drive fault gib lets go at once.
+ * GIB_BUSY, and only then the error is returned. After a drive fault, and after any fault in the first step, gib lets go at once: that
+ * step commands the speed asked for or, where that is no number, the last one within the limits, else the configuration's mean.
  *
  * @param handle the instance.
  * @param input what is asked for in this cycle.
@@ -6377,7 +6383,8 @@ int32_t gib_vibration_start(struct gib_vibration *handle,
  * @param output the position; always written when not NULL.
  * @return GIB_OK when idle, GIB_BUSY, or the first error, which is kept until the next start: GIB_ERR_ABORTED,
  * GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE when the scale is no number (the last position is repeated in such a cycle, and the correction fades);
- * and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+ * and GIB_ERR_NULL, GIB_ERR_HANDLE of this call. Where `input` is NULL the last position is repeated, and `correction_um` is what is
+ * in it.
  *
  * [thread: cycle] [real-time: yes] [state: any]
  *

@@ -135,6 +135,10 @@ pub unsafe extern "C" fn gib_backlash_start(handle: *mut GibBacklash, config: *c
 /// instant. When `request_id` changes, put `compensation_um` and `reversal_acceleration_off` in force and report the
 /// number in `acknowledged_id` and the amount in force in `compensation_um`.
 ///
+/// A fault is named in `message` in the cycle in which it is found. In that cycle the command already brakes from its own last
+/// speed, no harder than `acceleration_mm_s2`, whatever is measured; with GIB_INPUT_FAULT, when the axis follows no command, it stays
+/// where it is. Then everything changed is restored; while that goes on the status is GIB_BUSY, and only then the error.
+///
 /// @param handle the instance.
 /// @param input measured values of this cycle.
 /// @param output commands for this cycle; always written when not NULL.

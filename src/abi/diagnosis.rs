@@ -351,7 +351,7 @@ fn number(verdict: Verdict) -> i32 {
 
 /// The diagnosis as JSON with schema "gib.diagnosis/1".
 ///
-/// Ask for the size first: `gib_diagnosis_json(handle, NULL, 0, &needed)`.
+/// Ask for the size first: `gib_diagnosis_json(handle, NULL, 0, &needed)` returns GIB_ERR_BUFFER and sets `needed`.
 ///
 /// @param handle the instance.
 /// @param json receives the text, UTF-8, with its NUL; NULL to ask for the size alone.

@@ -148,7 +148,8 @@ pub unsafe extern "C" fn gib_homing_start(handle: *mut GibHoming, config: *const
 /// `torque_limit` the limit in force. Take the torque off the motors while `stop_drive` is 1: that is at once where the torque is more
 /// than the limit allows (GIB_ERR_TORQUE_BOUND), since a drive that does not keep to it would press on while it brakes.
 ///
-/// A fault is named in `message` in the cycle in which it is found. Then gib brakes, goes back from what is pressed on, and gives the
+/// A fault is named in `message` in the cycle in which it is found. From that cycle on gib brakes from the speed commanded last, no
+/// harder than `acceleration_mm_s2`, unless it stops the drive; then it goes back from what is pressed on, and gives the
 /// old torque limit back; while that goes on the status is GIB_BUSY, and only then the error. It takes at most, in seconds:
 /// 5·(speed + approach speed) ÷ acceleration, (lag limit + `press_max_mm`) ÷ approach speed, four detection times and twice
 /// `ack_timeout_s`, together.

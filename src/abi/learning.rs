@@ -123,7 +123,7 @@ pub unsafe extern "C" fn gib_learning_start(handle: *mut GibLearning, config: *c
 /// GIB_ERR_LEARNING_GROWS and GIB_ERR_LEARNING_UPDATES with the best correction in force; GIB_ERR_LEARNING_DEVIATION,
 /// GIB_ERR_ABORTED, GIB_ERR_DRIVE_FAULT, GIB_ERR_DEADLINE (the spindle did not turn, or nothing was detected, for `wait_s`)
 /// and GIB_ERR_NON_FINITE (the target is no number: the last command is repeated meanwhile) with none; and GIB_ERR_NULL,
-/// GIB_ERR_HANDLE of this call.
+/// GIB_ERR_HANDLE of this call. Where `input` is NULL the last command is repeated, and `correction_um` is what is in it.
 ///
 /// [thread: cycle] [real-time: yes] [state: any]
 ///
@@ -143,20 +143,23 @@ pub unsafe extern "C" fn gib_learning_step(
     }
 }
 
-/// A step without an instance, an input or an output: the target, as far as there is one, else the last command.
+/// A step without an instance, an input or an output: the target, as far as there is one, else the last command with the
+/// correction in it.
 #[cold]
 fn misused(
     handle: Option<&mut GibLearning>,
     input: Option<&LearningInput>,
     output: Option<&mut LearningOutput>,
 ) -> i32 {
-    let living = handle.as_ref().filter(|handle| handle.alive == ALIVE);
-    let status = if handle.is_some() && living.is_none() { GIB_ERR_HANDLE } else { GIB_ERR_NULL };
+    let dead = handle.as_ref().is_some_and(|handle| handle.alive != ALIVE);
+    let status = if dead { GIB_ERR_HANDLE } else { GIB_ERR_NULL };
     let target = input.map(|input| input.target_mm).filter(|target| target.is_finite());
-    let command_mm = target.or(living.map(|handle| handle.machine.command())).unwrap_or(0.0);
+    let last = handle.filter(|_| !dead).map(|handle| (handle.machine.command(), handle.machine.correction()));
     if let Some(output) = output {
+        let (command_mm, correction_um) = target.map(|target| (target, 0.0)).or(last).unwrap_or_default();
         *output = LearningOutput {
             command_mm,
+            correction_um,
             status,
             message: status,
             phase: GIB_LEARNING_FAILED,
@@ -210,7 +213,7 @@ pub unsafe extern "C" fn gib_learning_result(handle: *const GibLearning, report:
 /// Reads target, command and detected position over the spindle's angle.
 ///
 /// @param handle the instance.
-/// @param points receives them, from -180 degrees on; may be NULL to learn the count.
+/// @param points receives them, from -180 degrees on; NULL with `capacity` 0 to learn the count, by GIB_ERR_BUFFER unless it is 0.
 /// @param capacity points that fit at `points`.
 /// @param count receives how many there are.
 /// @return GIB_OK; GIB_ERR_BUFFER when there are more than fit, GIB_ERR_NULL, GIB_ERR_HANDLE.

@@ -157,7 +157,7 @@ pub unsafe extern "C" fn gib_machine_save(handle: *mut GibMachine, path: *const 
 
 /// The machine as JSON with schema "gib.machine/1".
 ///
-/// Ask for the size first: `gib_machine_result(handle, NULL, 0, &needed)`.
+/// Ask for the size first: `gib_machine_result(handle, NULL, 0, &needed)` returns GIB_ERR_BUFFER and sets `needed`.
 ///
 /// @param handle the instance.
 /// @param json receives the text, UTF-8, with its NUL; NULL to ask for the size alone.

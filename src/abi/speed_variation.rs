@@ -124,7 +124,8 @@ pub unsafe extern "C" fn gib_speed_variation_start(
 /// each: it takes effect within 20 cycles, and until then the variation goes on as before. Cutting torque counts at once.
 ///
 /// A fault is named in `message` in its cycle; the speed then goes back to its mean as after GIB_SPEED_VARIATION_STOP, with status
-/// GIB_BUSY, and only then the error is returned. After a drive fault gib lets go at once.
+/// GIB_BUSY, and only then the error is returned. After a drive fault, and after any fault in the first step, gib lets go at once: that
+/// step commands the speed asked for or, where that is no number, the last one within the limits, else the configuration's mean.
 ///
 /// @param handle the instance.
 /// @param input what is asked for in this cycle.

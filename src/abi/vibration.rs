@@ -129,7 +129,8 @@ pub unsafe extern "C" fn gib_vibration_start(
 /// @param output the position; always written when not NULL.
 /// @return GIB_OK when idle, GIB_BUSY, or the first error, which is kept until the next start: GIB_ERR_ABORTED,
 /// GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE when the scale is no number (the last position is repeated in such a cycle, and the correction fades);
-/// and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+/// and GIB_ERR_NULL, GIB_ERR_HANDLE of this call. Where `input` is NULL the last position is repeated, and `correction_um` is what is
+/// in it.
 ///
 /// [thread: cycle] [real-time: yes] [state: any]
 ///
@@ -149,7 +150,8 @@ pub unsafe extern "C" fn gib_vibration_step(
     }
 }
 
-/// A step without an instance, an input or an output: the plain scale, as far as there is one.
+/// A step without an instance, an input or an output: the plain scale, as far as there is one, else the last position with the
+/// correction in it.
 #[cold]
 fn misused(
     handle: Option<&mut GibVibration>,
@@ -159,10 +161,12 @@ fn misused(
     let living = handle.as_ref().filter(|handle| handle.alive == ALIVE);
     let status = if handle.is_some() && living.is_none() { GIB_ERR_HANDLE } else { GIB_ERR_NULL };
     let scale = input.map(|input| input.scale_mm).filter(|scale| scale.is_finite());
-    let position_mm = scale.or(living.map(|handle| handle.machine.position())).unwrap_or(0.0);
+    let last = living.map(|handle| (handle.machine.position(), handle.machine.correction()));
     if let Some(output) = output {
+        let (position_mm, correction_um) = scale.map(|scale| (scale, 0.0)).or(last).unwrap_or_default();
         *output = VibrationOutput {
             position_mm,
+            correction_um,
             status,
             message: status,
             phase: GIB_VIBRATION_FAILED,

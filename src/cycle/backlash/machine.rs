@@ -315,8 +315,10 @@ impl Backlash {
         let danger = if (self.safe(input) && !first) || self.regardless() { None } else { self.danger(input) };
         if let Some(fault) = danger {
             self.leave(fault);
+            self.set_off();
         } else if self.left == 0 {
             self.overdue(input);
+            self.set_off();
         } else {
             self.left -= 1;
             self.advance(input);

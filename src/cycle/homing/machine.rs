@@ -318,6 +318,9 @@ impl Homing {
             }
             if self.phase == Phase::Touch { self.touch() } else { self.advance(input) }
         }
+        if self.phase == Phase::Stopping {
+            self.set_off();
+        }
         self.command();
     }
 

@@ -140,6 +140,9 @@ impl SpeedVariation {
             return Err(Fault::of(GIB_ERR_STATE));
         }
         let plan = plan?;
+        let (last, to_rpm) = (self.output.speed_command_rpm, plan.sense * rpm_from_rad_s(1.0));
+        // The first input may say no speed: then the spindle must not be stopped by an instance that has never commanded one.
+        let speed_command_rpm = if plan.speed(last).is_ok() { last } else { plan.mean * to_rpm };
         *self = SpeedVariation {
             plan,
             speed: plan.mean,
@@ -149,8 +152,8 @@ impl SpeedVariation {
             motor: plan.driving(plan.motor),
             per_nm: plan.cycle_s / plan.motor.inertia,
             to_torque: plan.sense * plan.motor.inertia / plan.cycle_s,
-            to_rpm: plan.sense * rpm_from_rad_s(1.0),
-            output: SpeedVariationOutput { speed_command_rpm: self.output.speed_command_rpm, ..Default::default() },
+            to_rpm,
+            output: SpeedVariationOutput { speed_command_rpm, ..Default::default() },
             ..SpeedVariation::default()
         };
         self.enter(Phase::Begin);
@@ -308,11 +311,7 @@ impl SpeedVariation {
     #[inline(never)]
     fn turn_unlike(&mut self, input: &SpeedVariationInput) {
         match self.phase {
-            Phase::Idle | Phase::Done | Phase::Failed => {
-                if input.speed_rpm.is_finite() {
-                    self.output.speed_command_rpm = input.speed_rpm;
-                }
-            }
+            Phase::Idle | Phase::Done | Phase::Failed => self.rest(input),
             Phase::Stopping => match danger(input) {
                 Some(fault) => self.leave(fault),
                 None => (self.seen, self.flags) = (pairs(input), input.flags),
@@ -346,7 +345,12 @@ impl SpeedVariation {
         let before = self.asked[3];
         match asked {
             Ok(asked) => self.asked = asked,
-            Err(fault) => return self.leave(fault),
+            Err(fault) => {
+                if begins {
+                    self.rest(input);
+                }
+                return self.leave(fault);
+            }
         }
         if begins {
             self.speed = self.asked[0];
@@ -365,6 +369,13 @@ impl SpeedVariation {
         (self.quiet, self.meanwhile) = (0, self.meanwhile.max(self.quiet));
         if input.flags & GIB_SPEED_VARIATION_STOP != 0 {
             self.set_out();
+        }
+    }
+
+    /// Where nothing is varied the command is the speed asked for, or the last one where that is no number.
+    fn rest(&mut self, input: &SpeedVariationInput) {
+        if input.speed_rpm.is_finite() {
+            self.output.speed_command_rpm = input.speed_rpm;
         }
     }
 

@@ -212,12 +212,7 @@ impl Plan {
     /// # Errors
     /// `GIB_ERR_CONFIG` or `GIB_ERR_SPEED_VARIATION_SPEED` with the input's name, value and range.
     pub fn wanted(&self, speed_rpm: f64, amplitude: f64, period: f64, cutting: f64) -> Result<[f64; 4], Fault> {
-        // A bound that is asked for exactly must not be lost by rounding.
-        const ROUNDING: f64 = 1e-12;
-        let [low, high] = self.motor.speeds.map(rpm_from_rad_s);
-        let (low, high) = (low.max(1e-3) * (1.0 - ROUNDING), high * (1.0 + ROUNDING));
-        let speed = in_range("speed_rpm\0", speed_rpm * self.sense, low, high)
-            .map_err(|fault| Fault { code: GIB_ERR_SPEED_VARIATION_SPEED, ..fault })?;
+        let speed = self.speed(speed_rpm)?;
         // Less than the least is the least: on the way to nothing it must not become a number too small for a cycle.
         let amplitude = match in_range("amplitude_ratio\0", amplitude, 0.0, MOST)? {
             0.0 => self.amplitude,
@@ -225,12 +220,26 @@ impl Plan {
         };
         let period = if period == 0.0 { self.period } else { period };
         Ok([
-            rad_s_from_rpm(speed),
+            speed,
             amplitude,
             in_range("period_s\0", period, PERIODS[0].max(8.0 * self.cycle_s), PERIODS[1])?,
             // Within what is reserved a live reading changes nothing.
             in_range("cutting_nm\0", cutting, 0.0, MOST_CUTTING)?.max(self.cutting),
         ])
+    }
+
+    /// A speed in rpm, within the limits and in the sense of the configuration, as rad/s in that sense.
+    ///
+    /// # Errors
+    /// `GIB_ERR_SPEED_VARIATION_SPEED` with its value and range.
+    pub fn speed(&self, speed_rpm: f64) -> Result<f64, Fault> {
+        // A bound that is asked for exactly must not be lost by rounding.
+        const ROUNDING: f64 = 1e-12;
+        let [low, high] = self.motor.speeds.map(rpm_from_rad_s);
+        let (low, high) = (low.max(1e-3) * (1.0 - ROUNDING), high * (1.0 + ROUNDING));
+        in_range("speed_rpm\0", speed_rpm * self.sense, low, high)
+            .map(rad_s_from_rpm)
+            .map_err(|fault| Fault { code: GIB_ERR_SPEED_VARIATION_SPEED, ..fault })
     }
 }
 

@@ -57,8 +57,9 @@ pub struct Vibration {
     /// Progress at which the present revolution ends; for the harmonics only the first has an end.
     revolution: f64,
     blend: f64,
-    /// Position put out last.
+    /// Position put out last, and the correction in it.
     position: f64,
+    correction: f64,
     /// What is left of a correction that ended at once, µm, and by how much it shrinks in a cycle.
     leaving: f64,
     leaves: f64,
@@ -98,6 +99,7 @@ impl Default for Vibration {
             revolution: 1.0,
             blend: 0.0,
             position: 0.0,
+            correction: 0.0,
             leaving: 0.0,
             leaves: 0.0,
             usual: 0,
@@ -128,8 +130,10 @@ impl Vibration {
         if self.busy() {
             return Err(Fault::of(GIB_ERR_STATE));
         }
-        let (plan, position, leaving, leaves) = (plan?, self.position, self.leaving, self.leaves);
-        *self = Vibration { plan, phase: Phase::Running, position, leaving, leaves, ..Vibration::default() };
+        let plan = plan?;
+        let Vibration { position, correction, leaving, leaves, .. } = *self;
+        *self =
+            Vibration { plan, phase: Phase::Running, position, correction, leaving, leaves, ..Vibration::default() };
         self.trackers = Trackers::bounding(self.plan.displacement_max as f32);
         Ok(())
     }
@@ -157,6 +161,12 @@ impl Vibration {
     #[must_use]
     pub fn position(&self) -> f64 {
         self.position
+    }
+
+    /// The correction in it, µm.
+    #[must_use]
+    pub fn correction(&self) -> f64 {
+        self.correction
     }
 
     /// One servo cycle; returns the status.

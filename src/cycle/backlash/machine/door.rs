@@ -28,7 +28,8 @@ impl Backlash {
         Fault { code: GIB_ERR_ACK_TIMEOUT, field, value, low, high }
     }
 
-    /// The one door out of a measurement: keeps the first fault, brakes, restores, fails.
+    /// The one door out of a measurement: keeps the first fault, brakes, restores, fails. A faulted drive follows no command: it
+    /// is held where it is.
     #[cold]
     pub(super) fn leave(&mut self, fault: Fault) {
         if matches!(self.phase, Phase::Stopping | Phase::Restore) {
@@ -41,6 +42,21 @@ impl Backlash {
             let bound = self.profile.cycles_bound();
             self.enter(Phase::Stopping, bound);
         } else {
+            self.restore();
+        }
+    }
+
+    /// The way out begins in the cycle of its fault: a command that stood still for one would jerk twice.
+    #[cold]
+    pub(super) fn set_off(&mut self) {
+        if self.phase == Phase::Stopping {
+            self.brake();
+        }
+    }
+
+    /// One cycle of braking.
+    pub(super) fn brake(&mut self) {
+        if self.profile.step() {
             self.restore();
         }
     }

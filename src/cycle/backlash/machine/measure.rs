@@ -42,11 +42,7 @@ impl Backlash {
                     self.written(input, then);
                 }
             }
-            Phase::Stopping => {
-                if self.profile.step() {
-                    self.restore();
-                }
-            }
+            Phase::Stopping => self.brake(),
             Phase::Restore => {
                 if self.confirmed(input) {
                     self.changed = false;

@@ -4,6 +4,17 @@ use super::*;
 use crate::cycle::profile::{higher, lower};
 
 impl Homing {
+    /// The way out begins in the cycle of its fault: a command that stood still for one would jerk twice. One that has gone on
+    /// already in this cycle brakes from the next.
+    #[cold]
+    pub(super) fn set_off(&mut self) {
+        for (side, last) in self.sides.iter_mut().zip(self.output.target_position_mm).take(self.plan.motors) {
+            if side.profile.position == last {
+                side.profile.step();
+            }
+        }
+    }
+
     /// A cycle on the way out: it ends whatever the input says, without a move where position or drive are not to be
     /// trusted, or the axis flies.
     pub(super) fn exit(&mut self, input: &HomingInput) {

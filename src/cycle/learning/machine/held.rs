@@ -7,6 +7,14 @@ use crate::cycle::vibration::harmonic::PAIRS;
 use crate::cycle::vibration::spindle::Wheel;
 
 impl Learning {
+    /// The correction in the command put out last, µm.
+    #[cold]
+    pub fn correction(&mut self) -> f64 {
+        // Usual cycles do not keep it.
+        self.settle_usual();
+        self.correction
+    }
+
     /// Points of the revolution; none before the first start or `install`.
     #[must_use]
     pub fn count(&self) -> usize {

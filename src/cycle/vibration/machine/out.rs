@@ -18,6 +18,7 @@ impl Vibration {
         let left = if self.leaving == 0.0 { 0.0 } else { self.part() };
         let correction = self.blend * relative + left;
         self.position = plain + 1e-3 * correction;
+        self.correction = correction;
         self.seen |= reasons;
         *output = VibrationOutput {
             position_mm: self.position,
@@ -77,6 +78,7 @@ impl Vibration {
     pub(super) fn rest(&mut self, plain: f64, output: &mut VibrationOutput) {
         let correction_um = self.part();
         self.position = plain + 1e-3 * correction_um;
+        self.correction = correction_um;
         let failed = self.phase == Phase::Failed;
         *output = VibrationOutput {
             position_mm: self.position,

@@ -43,6 +43,7 @@ impl Vibration {
         let [seat, bearing] = [-f64::from(seat), -f64::from(bearing)];
         let relative = seat - bearing;
         self.position = input.scale_mm + 1e-3 * relative;
+        self.correction = relative;
         *output = VibrationOutput {
             position_mm: self.position,
             correction_um: relative,
