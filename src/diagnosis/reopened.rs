@@ -18,9 +18,11 @@ use crate::machine::{Axis, Cause, Effect};
 const STEPS: usize = 8;
 /// Excess over the noise floor (in variance) that causes may leave: a floor that is read off a thousand rows is known better.
 const LITTLE_LEFT_BY_CAUSES: f64 = 0.2;
-/// What other numbers leave at most of what was left above the noise floor, in amplitude: of three machines with coloured noise, of which the
-/// floor does not see all, the right ones left 0.55 to 0.6.
-const MOST_LEFT: f64 = 0.65;
+/// What other numbers leave at most of what was left above the noise floor, in amplitude. What is simulated never has its impacts quite right.
+const MOST_LEFT: f64 = 0.5;
+/// The same of what is worked out by rows: of three machines with coloured noise, of which the floor does not see all, the right ones left
+/// 0.55 to 0.6.
+const MOST_LEFT_BY_ROWS: f64 = 0.65;
 /// The same of a ripple: what is left beside one is a ripple of the same period, and not another.
 const MOST_LEFT_OF_RIPPLE: f64 = 0.96;
 
@@ -87,7 +89,11 @@ fn suspects(axis: &Axis, frame: &Frame) -> Vec<Suspect> {
         let believed = numbers(axis, frame, effect).filter(|_| is_by_itself(axis, effect))?;
         let mut others = axis.effects.clone();
         others.remove(i);
-        let most_left = if has_phase(effect) { MOST_LEFT_OF_RIPPLE } else { MOST_LEFT };
+        let most_left = match effect {
+            effect if has_phase(effect) => MOST_LEFT_OF_RIPPLE,
+            effect if is_of_one(effect) => MOST_LEFT,
+            _ => MOST_LEFT_BY_ROWS,
+        };
         Some(Suspect { without: axis.with_effects(others), laws: vec![believed.0], believed, most_left })
     };
     let alone = axis.effects.iter().enumerate().filter(|(_, effect)| !(both && is_of_one(effect)));

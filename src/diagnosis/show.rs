@@ -41,8 +41,9 @@ const TIED: f64 = 0.05;
 /// Variance above the noise floor, in units of the floor's, from which on it is said where a residual lives.
 const LITTLE: f64 = 0.5;
 
-/// Standard deviations of what chance puts there that are sure to be more.
+/// Standard deviations of what chance puts there that are sure to be more, and a share that is never chance.
 const SURE: f64 = 3.0;
+const MOST_BY_CHANCE: f64 = 0.1;
 
 /// How much wider than that of the balance the low-pass is that takes the encoder's noise off the acceleration; odd.
 const SMOOTHER: usize = 5;
@@ -180,7 +181,7 @@ fn places(frame: &Frame, coordinate: Coordinate) -> Vec<f64> {
 #[must_use]
 pub fn is_tied(bench: &Bench, fit: &Fit, independent: f64) -> bool {
     let [rest, _] = bench.rest(fit);
-    let least = TIED.max(SURE * chance(independent));
+    let least = TIED.max((SURE * chance(independent)).min(MOST_BY_CHANCE));
     against(bench.frame, &rest, &rest, independent).iter().any(|view| view.after > least)
 }
 

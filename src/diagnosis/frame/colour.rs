@@ -14,6 +14,8 @@ const MOST: f64 = 0.95;
 /// By what share mean squares of differences may be off besides what chance makes, as deviations of it.
 const OFF: f64 = 0.1;
 const SURE: f64 = 2.0;
+/// Independent rows below which what is slow cannot be told from what wanders.
+const FEWEST: f64 = 120.0;
 /// How far correlations are added up, in judged rows.
 const FAR: usize = 200;
 
@@ -53,7 +55,8 @@ impl Frame<'_> {
             (distances.iter().map(off).fold(0.0, f64::max), independent)
         };
         let (off, independent) = tried.map(of).min_by(|a, b| a.0.total_cmp(&b.0))?;
-        (off < OFF + SURE * (2.0 / independent).sqrt()).then_some(independent)
+        let many = independent > FEWEST;
+        (many && off < OFF + SURE * (2.0 / independent).sqrt()).then_some(independent)
     }
 
     /// Correlation over so many rows and fewer of noise of the first order as it is on the judged rows.
