@@ -267,11 +267,11 @@ fn may_be_noise(bench: &Bench, fit: &Fit, left: &Excess) -> bool {
     (coloured.is_some() || left.of_channel(0) <= TOLERABLE_IF_UNTIED) && !show::is_tied(bench, fit, rows)
 }
 
-/// Whether what a fit leaves of the torque is noise of the first order.
+/// Whether what a fit leaves of the torque is noise of the first order, and goes with nothing.
 #[must_use]
 pub fn is_coloured(bench: &Bench, fit: &Fit) -> bool {
     let [rest, _] = bench.rest(fit);
-    bench.frame.independent_rows(&rest).is_some()
+    bench.frame.independent_rows(&rest).is_some_and(|rows| !show::is_tied(bench, fit, rows))
 }
 
 /// By how much a machine leaves more than noise of a frame; `None` where all may be noise.

@@ -5,6 +5,7 @@ use super::blocks;
 use super::fit::{Bench, Fit, Part};
 use super::form;
 use super::grids;
+use super::judge::{Excess, LITTLE_LEFT};
 use super::progress::{Stopped, Watch};
 use super::select::{LEAST_GAIN, LEAST_STRENGTH, once_only, price};
 use super::uncertainty;
@@ -94,7 +95,10 @@ fn slight(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
 /// The part of which least is known that it is there at all. What halves the rest of a channel is there, however little is
 /// known of its size: a law that is not quite the machine's leaves much, by which its size is uncertain.
 fn doubtful(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
-    let least = |part: &Part| if part.law.cause.row().repeatable { LEAST_OF_MANY } else { LEAST_STRENGTH };
+    // Where much is left a law that is not quite the machine's makes its size uncertain.
+    let little_left = Excess::of(bench, fit, fit).largest() <= LITTLE_LEFT;
+    let one_of_many = |part: &Part| little_left && part.law.cause.row().repeatable;
+    let least = |part: &Part| if one_of_many(part) { LEAST_OF_MANY } else { LEAST_STRENGTH };
     let strengths = uncertainty::strengths(bench, fit);
     let strengths: Vec<f64> = strengths.iter().zip(&fit.parts).map(|(own, part)| own / least(part)).collect();
     let open = (0..strengths.len()).filter(|&i| !fit.halves(&without[i]));
