@@ -166,18 +166,10 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     /// What held-out rows say of a set of causes by its errors there.
     fn weighed(&self, fit: &Fit, errors: Option<&Errors>, verdict: Verdict) -> Weighed {
         let gains = self.held_out.gains(self.believed.as_ref(), errors);
-        let mut in_judged_rows = self.held_out.judged_gains(self.believed.as_ref(), errors);
-        in_judged_rows.extend(gain::of_stretch(self.believed.as_ref(), errors));
+        let in_judged_rows = self.held_out.judged_gains(self.believed.as_ref(), errors);
         let effects: Vec<Effect> = fit.effects(self.bench.frame).collect();
-        let told = self.is_told_by_scale(fit);
-        let fails = misleads(verdict, &in_judged_rows) || refuted_but_for(told, &in_judged_rows, &effects);
+        let fails = misleads(verdict, &in_judged_rows) || refuted(&in_judged_rows, &effects);
         Weighed { gains, in_judged_rows, fails }
-    }
-
-    /// Whether the scale shows that the table goes as a set has it: half of how far it was elsewhere, in amplitude, or more is gone.
-    fn is_told_by_scale(&self, fit: &Fit) -> bool {
-        let [before, after] = [&self.empty, fit].map(|set| Excess::of(self.bench, set, fit).of_channel(1));
-        before > TOLERABLE_EXCESS && after < 0.25 * before
     }
 
     /// Errors of a set on held-out blocks.
@@ -197,7 +189,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     pub fn nothing(&self, found: &Selection) -> Judged {
         let before = Excess::of(self.bench, &self.empty, &found.fit);
         let above = before.largest() > TOLERABLE_EXCESS;
-        let untied = may_be_noise(self.bench, &self.empty, &before);
+        let untied = above && may_be_noise(self.bench, &self.empty, &before);
         let followed = above && self.is_followed();
         let unknown = above && (followed || !untied);
         Judged {
@@ -258,13 +250,9 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
 
 /// Whether what a fit leaves above the noise floor may be noise that the floor does not see.
 fn may_be_noise(bench: &Bench, fit: &Fit, left: &Excess) -> bool {
-    if left.of_channel(1) > TOLERABLE_EXCESS {
-        return false;
-    }
-    let [rest, _] = bench.rest(fit);
-    let coloured = bench.frame.independent_rows(&rest);
-    let rows = coloured.unwrap_or(rest.len() as f64);
-    (coloured.is_some() || left.of_channel(0) <= TOLERABLE_IF_UNTIED) && !show::is_tied(bench, fit, rows)
+    let rows = bench.rows as f64;
+    let untied = || left.of_channel(0) <= TOLERABLE_IF_UNTIED && !show::is_tied(bench, fit, rows);
+    left.of_channel(1) <= TOLERABLE_EXCESS && (untied() || is_coloured(bench, fit))
 }
 
 /// Whether what a fit leaves of the torque is noise of the first order, and goes with nothing.
@@ -306,23 +294,17 @@ fn is_another_curve(bench: &Bench, empty: &Fit, fit: &Fit) -> bool {
 }
 
 /// Whether a machine is no better than the belief: worse in torque and motor position together, and surely so in one of them
-/// or surely better in none, nor in how far the table is from the motor. The simulated table carries the motor's error along, with which
-/// what the table does may happen to go. A motor that delivers nothing beyond a level cannot say by its motion how far beyond it was driven: no better torque can
+/// or surely better in none. The simulated table carries the motor's error along, with which what the table does may happen to
+/// go. A motor that delivers nothing beyond a level cannot say by its motion how far beyond it was driven: no better torque can
 /// be asked of its machine.
 #[must_use]
 pub fn refuted(gains: &[Gain], causes: &[Effect]) -> bool {
-    refuted_but_for(false, gains, causes)
-}
-
-/// The same of a machine that is surely better in something else, or not.
-fn refuted_but_for(better: bool, gains: &[Gain], causes: &[Effect]) -> bool {
     let silent =
         |cause: &Effect| matches!(cause, Effect::TorqueSaturation { slope_ratio, .. } if *slope_ratio < LEAST_SLOPE);
     let silent = causes.iter().any(silent);
-    let motor = || {
-        gains.iter().filter(|gain| gain.channel == "position" || !silent && !gain.channel.starts_with("table_position"))
-    };
-    let surely_better = silent || better || gains.iter().any(|gain| gain.ci95[0] > 1.0);
+    let motor =
+        || gains.iter().filter(|gain| gain.channel == "position" || !silent && gain.channel != "table_position");
+    let surely_better = silent || gains.iter().any(|gain| gain.ci95[0] > 1.0);
     let surely_worse = motor().any(|gain| gain.ci95[1] < 1.0);
     motor().map(|gain| (gain.before / gain.after).ln()).sum::<f64>() < 0.0 && (surely_worse || !surely_better)
 }

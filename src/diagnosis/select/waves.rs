@@ -25,14 +25,14 @@ pub fn fewer(search: &Search, mut fit: Fit) -> Result<Fit, Stopped> {
     for law in search.laws {
         let is_wave = |part: &&Part| part.law.cause == law.cause;
         let may_be_one = law.cause.row().repeatable && law.cause != Cause::PositionDependentFriction;
-        let waves: Vec<Part> = fit.parts.iter().filter(is_wave).cloned().collect();
-        // The largest is nearest to what is there.
-        let empty = bench.fit(Vec::new());
-        let left = |part: &Part| figure(&bench.joined(&empty, part));
-        let Some(largest) = waves.iter().min_by(|a, b| left(a).total_cmp(&left(b))) else { continue };
-        if !may_be_one || waves.len() < 2 {
+        if !may_be_one || fit.parts.iter().filter(is_wave).count() < 2 {
             continue;
         }
+        // The largest is nearest to what is there.
+        let empty = bench.fit(Vec::new());
+        let left = |part: &&Part| figure(&bench.joined(&empty, part));
+        let waves = fit.parts.iter().filter(is_wave);
+        let Some(largest) = waves.min_by(|a, b| left(a).total_cmp(&left(b))) else { continue };
         let others = bench.fit(fit.parts.iter().filter(|part| !is_wave(part)).cloned().collect());
         let periods = |i: usize| largest.shape[0] * (1.0 - ABOUT) + STEP * i as f64;
         let tried = (0..MOST).map(periods).take_while(|periods| *periods < largest.shape[0] * (1.0 + ABOUT));
