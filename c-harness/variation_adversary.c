@@ -302,6 +302,26 @@ static int32_t cycle(variation_adversary *a)
     return a->out.status;
 }
 
+/*
+ * Cycles that a way back from speed_rpm may take under the load of this cycle: twice what it takes the motor, by what it has left at the
+ * fastest, or at a tenth of the mean in a second where it has more; and a second. INFINITY where it has nothing left.
+ */
+static double time_for_the_way(const variation_adversary *a, double speed_rpm)
+{
+    const gib_speed_variation_config *g = &a->config;
+    double mean = spindle_rad_s(fabs(a->mean_rpm)), from = spindle_rad_s(speed_rpm), fastest = fmax(mean, from), keep = 1.0 - g->reserve_ratio;
+    double used = g->coulomb_nm + fmax(g->cutting_nm, a->true_cutting_nm);
+    double most = keep * fmin(given(g->torque_nm, INFINITY), g->power_w / fastest), left = most - used - g->viscous_nm_s * fastest;
+    double has = mean > from ? left : left + used + g->coulomb_nm, pace = 0.1 * mean;
+    if (g->formula == GIB_SPEED_VARIATION_EXACT) {
+        if (has <= 0.0) {
+            return INFINITY;
+        }
+        pace = fmin(pace, 0.9955 * has / (g->inertia_kg_m2 + g->own_inertia_kg_m2));
+    }
+    return (fmin(2.0 * fabs(mean - from) / pace, 600.0) + 1.0) / g->cycle_s + 3.0;
+}
+
 static void start(variation_adversary *a, int run)
 {
     const gib_speed_variation_config *g = &a->config;
@@ -352,7 +372,8 @@ static void vary(variation_adversary *a, int run)
     a->high_rpm = 0.0;
     a->low_rpm = INFINITY;
     int32_t status = GIB_BUSY;
-    double patience = INFINITY;
+    double patience = 0.0, from = 0.0, stood = fabs(g->speed_rpm);
+    int cannot = 0;
     while (status == GIB_BUSY && !a->base.broken) {
         int was_named = a->named;
         status = cycle(a);
@@ -361,13 +382,21 @@ static void vary(variation_adversary *a, int run)
             a->high_rpm = fmax(a->high_rpm, speed);
             a->low_rpm = fmin(a->low_rpm, speed);
         }
-        /* Back to the mean at a tenth of it a second at least, twice that time for a motor that cannot, and a second. */
+        /* A motor that cannot has the time of one that can at a tenth of the mean speed in a second. */
         if (a->named && !was_named) {
+            from = stood;
             patience = (20.0 * fabs(speed / fabs(a->mean_rpm) - 1.0) + 1.0) / g->cycle_s + 3.0;
         }
+        if (a->named) {
+            double time = time_for_the_way(a, from);
+            cannot = cannot || isinf(time) || time * g->cycle_s > 600.0;
+            patience = isinf(time) ? patience : fmax(patience, time);
+        }
+        stood = speed;
         law(&a->base, a->named == 0 || status != GIB_BUSY || a->base.cycle - a->named <= patience, "an end in time");
         law(&a->base, a->named || a->base.cycle <= a->cycles, "an end where it is asked for");
     }
+    law(&a->base, status != GIB_ERR_SPEED_VARIATION_NONE || cannot, "given up only where the motor cannot");
     a->status[run] = status;
     law(&a->base, status == GIB_DONE ? a->out.message == 0 || a->out.message > GIB_ERR_SPEED_VARIATION_NONE - 1 : a->out.message == status,
         "a named end");

@@ -150,8 +150,8 @@ pub fn measure(recording: &Recording, options: &Options) -> Result<Found, Record
                 gather.add(speed, torque);
             }
         }
-        let torque_step = gather.torque_step();
-        let question = Question { sample_s: period, torque_step, target, own, process_step };
+        let (torque_step, speed_step) = (gather.torque_step(), gather.speed_step());
+        let question = Question { sample_s: period, torque_step, speed_step, target, own, process_step };
         let (report, verdict) = InertiaReport::of(gather.blocks(), length as u32, &question);
         let refused = verdict.err().map(Refusal);
         // Lost in the noise of the speed: blocks of twice the length calm the acceleration by 2√2.

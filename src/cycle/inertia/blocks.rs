@@ -186,6 +186,13 @@ impl Gather {
         if step < f64::MAX { step * self.torque_nm } else { 0.0 }
     }
 
+    /// Smallest step seen between two speeds, rad/s; 0 where none was.
+    #[must_use]
+    pub fn speed_step(&self) -> f64 {
+        let step = self.calm.grid.0[0];
+        if step < f64::MAX { crate::units::rad_s_from_rpm(step) } else { 0.0 }
+    }
+
     /// Samples in a block.
     #[must_use]
     pub fn length(&self) -> u32 {

@@ -17,6 +17,8 @@ pub struct Question {
     pub sample_s: f64,
     /// Smallest step of the torque, N·m; 0: not known.
     pub torque_step: f64,
+    /// Smallest step of the speed, rad/s; 0: not known.
+    pub speed_step: f64,
     /// Expanded uncertainty wanted, as a share of the inertia.
     pub target: f64,
     /// The machine's own inertia and its expanded uncertainty, kg·m².
@@ -84,6 +86,8 @@ pub struct Balance {
 const FEWEST: usize = 12;
 /// Expanded uncertainty, as a share of the inertia, beyond which it cannot be called measured: a third.
 const WORST: f64 = 0.33;
+/// Where a tenth of what is left of the acceleration is noise, taking it off is no longer a small correction.
+const NOISY: f64 = 0.1;
 /// By how many standard deviations torque must exceed motion beyond a threshold for field weakening or saturation. The best of
 /// some dozens of thresholds exceeds 3.6 by chance once in a hundred times (Andrews 1993); 5.5 leaves room for ripple, whose
 /// residuals are neither normal nor independent.
@@ -119,7 +123,9 @@ pub fn fit(blocks: &[Block], length: u32, question: &Question) -> (Balance, Resu
     }
     let mut kept = [Block::default(); BLOCKS];
     let count = without_lone(blocks, &mut kept);
-    let whole = rows(kept.get(..count).unwrap_or(&[])).with_noise_that_torque_denies();
+    let plain = rows(kept.get(..count).unwrap_or(&[]));
+    let noise = plain.noise.max(counting_noise(length, question));
+    let whole = Rows { noise, ..plain }.with_noise_that_torque_denies();
     let rounding = rounding(&whole, length, question);
     let (rows, weakening, saturation) = trustworthy(whole, rounding.sqrt());
     balance.weakening = weakening;
@@ -127,7 +133,8 @@ pub fn fit(blocks: &[Block], length: u32, question: &Question) -> (Balance, Resu
     balance.left_out = blocks.len() - rows.blocks.iter().filter(|b| rows.counts(b)).count();
     let Some(found) = rows.fit() else {
         balance.ramp = blind_ramp(blocks);
-        let excitation = Fault::of(GIB_ERR_INERTIA_EXCITATION);
+        let drowned = Rows { noise: 0.0, ..rows }.fit().is_some();
+        let excitation = if drowned { noisy(1.0) } else { Fault::of(GIB_ERR_INERTIA_EXCITATION) };
         return (balance, Err(stuck(blocks).unwrap_or(excitation)));
     };
     let steep = quantile(blocks, 0.98, |b| b.acceleration.abs());
@@ -148,15 +155,20 @@ fn judge(balance: &Balance, found: &Regression) -> Result<(), Fault> {
         let field = "torque\0";
         return Err(Fault { code: GIB_ERR_INERTIA_SIGN, field, value, low: 0.0, high: f64::MAX });
     }
-    // Where a tenth of what is left of the acceleration is noise, taking it off is no longer a small correction.
-    if found.noise_share > 0.1 {
-        return Err(Fault { field: "acceleration_noise_ratio\0", ..excitation(found.noise_share, 0.1) });
+    if found.noise_share > NOISY {
+        return Err(noisy(found.noise_share));
     }
     let ratio = uncertainty / value.abs();
     if !(value > 0.0 && ratio <= WORST) {
         return Err(excitation(ratio, WORST));
     }
     Ok(())
+}
+
+/// Of the acceleration's variance this share is noise.
+fn noisy(share: f64) -> Fault {
+    let (code, field) = (GIB_ERR_INERTIA_EXCITATION, "acceleration_noise_ratio\0");
+    Fault { code, field, value: share, low: 0.0, high: NOISY }
 }
 
 fn rows(blocks: &[Block]) -> Rows<'_> {
@@ -214,6 +226,16 @@ fn acceleration_noise(blocks: &[Block]) -> f64 {
     let Some(seen) = curvature.get_mut(..n).filter(|seen| !seen.is_empty()) else { return 0.0 };
     let middle = *seen.select_nth_unstable_by(n / 2, f64::total_cmp).1;
     (STD_PER_MAD * middle).powi(2) / 6.0
+}
+
+/// Variance of a block's acceleration where the speed is the difference of an encoder's counts. A position is off by e, even
+/// within a count, and Σu·(eᵢ − eᵢ₋₁) = (N−1)/2·(e at the end + e before the first) − Σe. Neighbours share an e, so that what they
+/// differ by tells only a third of it.
+fn counting_noise(length: u32, question: &Question) -> f64 {
+    let n = f64::from(length);
+    let weights = n * (n * n - 1.0) / 12.0;
+    let even = question.speed_step * question.speed_step / 12.0;
+    even * (0.5 * (n - 1.0) + 1.0) * (n - 1.0) / (weights * question.sample_s).powi(2)
 }
 
 /// Leaves out what field weakening and saturation spoil, one after the other, where they are clear beyond chance.
@@ -398,7 +420,7 @@ mod tests {
     use super::*;
 
     const QUESTION: Question =
-        Question { sample_s: 1e-3, torque_step: 0.0, target: 0.05, own: [0.0; 2], process_step: 0 };
+        Question { sample_s: 1e-3, torque_step: 0.0, speed_step: 0.0, target: 0.05, own: [0.0; 2], process_step: 0 };
 
     /// Trapezoids with J 0.3, B 0.02, Tc 4 and a scatter of 0.05.
     fn trapezoids() -> Vec<Block> {

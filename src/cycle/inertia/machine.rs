@@ -143,7 +143,8 @@ impl Inertia {
         if self.phase != Phase::Done {
             return Err(Fault::of(GIB_ERR_STATE));
         }
-        let question = Question { torque_step: self.gather.torque_step(), ..self.plan.question };
+        let (torque_step, speed_step) = (self.gather.torque_step(), self.gather.speed_step());
+        let question = Question { torque_step, speed_step, ..self.plan.question };
         Ok(InertiaReport::of(self.gather.blocks(), self.gather.length(), &question))
     }
 

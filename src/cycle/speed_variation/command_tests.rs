@@ -264,7 +264,7 @@ fn bad_inputs_end_at_the_mean_speed() {
 }
 
 /// Torque and power of a cycle in which the speed changes (both rad/s): within those of `config` with that much cutting, less
-/// the trifle of them that is the speed loop's.
+/// the trifle of what accelerates that is the speed loop's.
 fn within_the_motor(
     config: &SpeedVariationConfig,
     omega: f64,
@@ -273,8 +273,8 @@ fn within_the_motor(
 ) -> Result<(), TestCaseError> {
     let friction = config.coulomb_nm + config.viscous_nm_s * omega;
     let accelerates = config.inertia_kg_m2 * change / config.cycle_s;
-    let (rise, brake) = (accelerates + friction + cutting_nm, accelerates + friction);
-    let [torque, power] = [config.torque_nm, config.power_w].map(|most| 0.9955 * most);
+    let (rise, brake) = (accelerates / 0.9955 + friction + cutting_nm, accelerates / 0.9955 + friction);
+    let [torque, power] = [config.torque_nm, config.power_w];
     if change > 1e-12 {
         prop_assert!(rise <= torque + 1e-6 && rise * omega <= power * (1.0 + 1e-9), "{} {}", rise, omega);
     }

@@ -6,6 +6,7 @@
 //! cycles ([`super::setting`]); the load counts at once. Cycles in which none of that can matter are granted in advance and
 //! cost little ([`quick`]).
 
+mod late;
 mod quick;
 mod way_back;
 
@@ -28,9 +29,9 @@ enum Phase {
     Idle,
     /// Waits for the first input, which says at what speed to stand until a variation is worked out; ends at once.
     Begin,
-    /// The speed varies; ends with a stop, an abort or a fault.
+    /// The speed varies; ends with a stop, an abort or a fault. A rise ends at its corner, or after twice its time.
     Running,
-    /// The speed goes back to its mean; ends when it is there, or after twice the time that should take.
+    /// The speed goes back to its mean; ends when it is there, or after twice the time that takes the motor.
     Stopping,
     /// Ended as asked for; ends with a start.
     Done,
@@ -65,12 +66,16 @@ pub struct SpeedVariation {
     now: Setting,
     next: Setting,
     piece: Piece,
-    /// Change of speed on the way back, and the cycles left to get there beside those granted.
+    /// Change of speed on the way back, and the way when it began.
     back: f64,
+    way: f64,
+    /// Cycles that it may take, and those left beside the ones granted.
+    deadline: u32,
     patience: u32,
     speed: f64,
-    /// Of a triangle.
+    /// Of a triangle: its sense, and how far the motor has left it behind since its last corner.
     rising: bool,
+    behind: f64,
     /// Phasor of a sine: cosine half a cycle ago and sine now; twice the sine of half its turn in a cycle; its swing now.
     phasor: [f64; 2],
     turn: f64,
@@ -86,7 +91,7 @@ pub struct SpeedVariation {
     motor: Motor,
     /// Friction that helps to brake, without cutting, which may end at any moment.
     brake_help: f64,
-    /// Cycle time over inertia.
+    /// Change of speed in a cycle per N·m left to accelerate with.
     per_nm: f64,
     /// The motor's power and torque, torque used and viscous friction, each as the change of speed in a cycle that it makes.
     in_changes: [f64; 4],
@@ -109,9 +114,12 @@ impl Default for SpeedVariation {
             next: Setting::still(0.0),
             piece: Piece::Nothing,
             back: 0.0,
+            way: 0.0,
+            deadline: 0,
             patience: 0,
             speed: 0.0,
             rising: true,
+            behind: 0.0,
             phasor: [1.0, 0.0],
             turn: 0.0,
             swing: 0.0,
@@ -150,7 +158,7 @@ impl SpeedVariation {
             now: Setting::still(plan.mean),
             slope: plan.wave == Wave::Triangle,
             motor: plan.driving(plan.motor),
-            per_nm: plan.cycle_s / plan.motor.inertia,
+            per_nm: plan.change_per_nm(),
             to_torque: plan.sense * plan.motor.inertia / plan.cycle_s,
             to_rpm,
             output: SpeedVariationOutput { speed_command_rpm, ..Default::default() },
@@ -216,7 +224,11 @@ impl SpeedVariation {
             Wave::Sine => (self.speed, self.sine()),
         };
         self.go(wanted);
-        self.grant(self.speed - before);
+        let change = self.speed - before;
+        self.grant(change);
+        if self.slope && change < wanted {
+            self.stay_behind(wanted - change);
+        }
     }
 
     /// Goes by `wanted`, or as much of it as the motor has torque and power for at the speed that this leads to.
@@ -255,7 +267,7 @@ impl SpeedVariation {
             if over < 0.0 {
                 return if speed < low { low - speed } else { rate };
             }
-            self.rising = false;
+            (self.rising, self.behind) = (false, 0.0);
             if over > rate { high - speed } else { rate - 2.0 * over }
         } else {
             let over = low - (speed - rate);
@@ -432,7 +444,7 @@ impl SpeedVariation {
         self.swing = self.swing.min(next.swing);
         // What has stood begins upward.
         self.rising |= self.now.rate == 0.0;
-        self.now = next;
+        (self.now, self.behind) = (next, 0.0);
         self.look_anew();
     }
 

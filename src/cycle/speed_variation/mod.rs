@@ -19,3 +19,5 @@ pub mod setting;
 
 #[cfg(test)]
 mod command_tests;
+#[cfg(test)]
+mod deadline_tests;

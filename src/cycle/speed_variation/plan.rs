@@ -136,13 +136,18 @@ impl Plan {
     /// That motor as the command may use it.
     #[must_use]
     pub fn driving(&self, motor: Motor) -> Motor {
-        // The last trifle is the speed loop's, which follows the command with a little overshoot.
-        const FOLLOWED: f64 = 0.9955;
         // The print knows no limit at the top of the swing, and is shown without one.
         const ENDLESS: f64 = 1e30;
-        let [power, torque] =
-            if self.published { [ENDLESS; 2] } else { [motor.power, motor.torque].map(|most| FOLLOWED * most) };
-        Motor { power, torque, ..motor }
+        if self.published { Motor { power: ENDLESS, torque: ENDLESS, ..motor } } else { motor }
+    }
+
+    /// Change of speed (rad/s) in a cycle that the command makes of a N·m left to accelerate with.
+    #[must_use]
+    pub fn change_per_nm(&self) -> f64 {
+        // The last trifle is the speed loop's, which follows the command with a little overshoot. It is kept of what accelerates, as
+        // the overshoot is: kept of all torque it could be all that friction and cutting leave, and a corner out of reach.
+        const FOLLOWED: f64 = 0.9955;
+        FOLLOWED * self.cycle_s / self.motor.inertia
     }
 
     /// Friction that helps to brake beside `used` (N·m): without cutting, which may end at any moment.

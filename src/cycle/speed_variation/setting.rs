@@ -118,7 +118,7 @@ impl Setting {
                 Piece::Rest
             }
             Piece::Rest => {
-                let (driving, torque) = (plan.driving(motor), self.rate * plan.motor.inertia / plan.cycle_s);
+                let (driving, torque) = (plan.driving(motor), self.rate / plan.change_per_nm());
                 self.free = [0.0, plan.brake_help(motor.used)].map(|help| driving.fastest(torque - help));
                 let (_, sin) = cos_sin(0.5 * plan.cycle_s / period);
                 self.half = [(1.0 - sin * sin).sqrt(), sin];
@@ -135,5 +135,5 @@ fn corner_rate(plan: &Plan, motor: &Motor, low: f64) -> f64 {
     const OVERSHOOT: f64 = 0.042;
     let Motor { power, used, viscous, .. } = plan.driving(*motor);
     let left = power / low - used - viscous * low;
-    left.max(0.0) * plan.cycle_s / plan.motor.inertia / (1.0 + OVERSHOOT)
+    left.max(0.0) * plan.change_per_nm() / (1.0 + OVERSHOOT)
 }

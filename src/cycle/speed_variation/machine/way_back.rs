@@ -10,6 +10,7 @@ impl SpeedVariation {
         if cutting != self.asked[3] && (0.0..=MOST_CUTTING).contains(&cutting) {
             self.asked[3] = cutting;
             self.load(cutting);
+            self.give_time();
         }
         // What was granted and has not gone by is left, too.
         self.patience = (self.patience + self.quiet as u32).saturating_sub(1);
@@ -43,8 +44,9 @@ impl SpeedVariation {
     pub(super) fn set_out(&mut self) {
         const SLOWEST_1_S: f64 = 0.1;
         self.back = self.now.rate.max(SLOWEST_1_S * self.mean() * self.plan.cycle_s);
-        let cycles = 2.0 * (self.mean() - self.speed).abs() / self.back + 1.0 / self.plan.cycle_s;
-        self.patience = cycles as u32;
+        self.way = (self.mean() - self.speed).abs();
+        self.deadline = self.time_for_the_way();
+        self.patience = self.deadline;
         self.slope = true;
         self.enter(Phase::Stopping);
     }
