@@ -304,7 +304,7 @@ impl Turn {
         }
         let variance = before.error.powi(2) + after.error.powi(2) + (2.0 * motor_error).powi(2);
         let mut fit = Box::new(Fit::default());
-        fit.start(Levels { before: before.value, after: after.value, motor, variance }, TURNED);
+        fit.start(Levels { before: before.value, after: after.value, motor, variance }, TURNED, None);
         for _ in 0..=Fit::slices_bound() {
             if fit.advance(&curve) {
                 break;

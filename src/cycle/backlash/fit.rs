@@ -18,6 +18,8 @@
 //! Nothing here uses the torque at standstill, which is partly released, nor the break-away, which is above the
 //! sliding torque: only slopes, the two kinks and sliding levels count (CN103561904 takes the break-away peak).
 //!
+//! Where the curve begins too late for its release, `unseen` counts from where the motor turned.
+//!
 //! Kinks are searched on a grid and refined by Gauss–Newton; running sums make each trial independent of the
 //! curve's length. The stretch used ends below the sliding level, at the largest share of the wind-up whose
 //! residuals show no structure, since near sliding the curve is rounded by creep and break-away.
@@ -27,6 +29,10 @@ use super::curve::{BINS, Curve, Moments};
 use super::fitted::{Fitted, Levels};
 use super::rounding::{Line, Rounding, TOGETHER};
 use crate::cycle::level::inflation;
+
+mod unseen;
+
+use unseen::Unseen;
 
 /// Shares of the wind-up tried, largest first.
 const SHARES: [f64; 3] = [0.65, 0.5, 0.35];
@@ -99,6 +105,10 @@ pub struct Fit {
     chosen: Option<Fitted>,
     line: Line,
     rounding: Rounding,
+    /// By how much the motor had come back from its furthest point when the curve began, mm; `None`: not known.
+    returned: Option<f64>,
+    /// The release is not on the curve: there is no first kink.
+    unseen: Option<Unseen>,
     sums: [Moments; BINS + 1],
 }
 
@@ -119,6 +129,8 @@ impl Default for Fit {
             chosen: None,
             line: Line::default(),
             rounding: Rounding::default(),
+            returned: None,
+            unseen: None,
             sums: [Moments::default(); BINS + 1],
         }
     }
@@ -126,9 +138,12 @@ impl Default for Fit {
 
 impl Fit {
     /// Begins the fit of a curve whose levels are known. The rounded curve leaves out the share `turned` of the way to the first kink,
-    /// where the curve's bins are so fine that the motor's friction has not turned round in the first two.
-    pub fn start(&mut self, levels: Levels, turned: f64) {
+    /// where the curve's bins are so fine that the motor's friction has not turned round in the first two. `returned` (mm, at least 0): the motor's way from its furthest point to where
+    /// the curve begins, `None` where that is not known.
+    pub fn start(&mut self, levels: Levels, turned: f64, returned: Option<f64>) {
         self.levels = levels;
+        self.returned = returned;
+        self.unseen = None;
         self.turned = turned;
         self.share = 0;
         self.first = 0;
@@ -167,7 +182,8 @@ impl Fit {
     #[must_use]
     pub const fn slices_bound() -> u32 {
         let passes = 2 * (BINS / SLICE + 2) + GRID * GRID / TRIALS + 2 + 2 * STEPS as usize + 4;
-        (passes * SHARES.len()) as u32 + Rounding::slices_bound(BINS)
+        // A second time where the release turns out not to be on the curve.
+        (2 * passes * SHARES.len()) as u32 + Rounding::slices_bound(BINS)
     }
 
     fn running(&self, bins: usize) -> &Moments {
@@ -242,7 +258,10 @@ impl Fit {
     fn parts(&self, curve: &Curve, s1: f64, s2: f64) -> (Moments, Moments, Moments) {
         let start = self.running(self.first);
         let all = self.running(self.end).since(start);
-        let release = self.running(self.bins_before(curve, s1)).since(start);
+        let release = match self.unseen {
+            None => self.running(self.bins_before(curve, s1)).since(start),
+            Some(_) => Moments::default(),
+        };
         let windup = self.running(self.end).since(self.running(self.bins_before(curve, s2)));
         (release, windup, all)
     }
@@ -250,7 +269,8 @@ impl Fit {
     /// Best c and k for given kinks.
     fn trial(&self, curve: &Curve, s1: f64, s2: f64) -> Trial {
         let (a, b, all) = self.parts(curve, s1, s2);
-        if s2 > s1 && a.bins.min(b.bins) < FEWEST_BINS {
+        let before = if self.unseen.is_some() { all.bins - b.bins } else { a.bins };
+        if s2 > s1 && before.min(b.bins) < FEWEST_BINS {
             return NO_TRIAL;
         }
         let g = (a.s - s1 * a.n) + (b.s - s2 * b.n);
@@ -269,6 +289,7 @@ impl Fit {
     fn search(&mut self, curve: &Curve, from: usize) {
         let low = self.first as f64 * curve.width_mm();
         let step = (self.end as f64 * curve.width_mm() - low) / GRID as f64;
+        let trials = if self.unseen.is_some() { GRID } else { GRID * GRID };
         let mut next = from;
         for _ in 0..TRIALS {
             let (i, j) = (next / GRID, next % GRID);
@@ -280,7 +301,7 @@ impl Fit {
             }
             next += 1;
         }
-        self.stage = if next < GRID * GRID {
+        self.stage = if next < trials {
             Stage::Search { next }
         } else if self.best.sse.is_finite() {
             Stage::Refine { step: 0 }
@@ -296,10 +317,11 @@ impl Fit {
         let gga = a.ss - 2.0 * t.s1 * a.s + t.s1 * t.s1 * a.n;
         let ggb = b.ss - 2.0 * t.s2 * b.s + t.s2 * t.s2 * b.n;
         let k = t.k;
+        let no_kink = if self.unseen.is_some() { 1.0 } else { 0.0 };
         let matrix = [
             [all.n, ga + gb, -k * a.n, -k * b.n],
             [ga + gb, gga + ggb, -k * ga, -k * gb],
-            [-k * a.n, -k * ga, k * k * a.n, 0.0],
+            [-k * a.n, -k * ga, k * k * a.n + no_kink, 0.0],
             [-k * b.n, -k * gb, 0.0, k * k * b.n],
         ];
         let right = [0.0, 0.0, -k * (a.t - t.c * a.n - k * ga), -k * (b.t - t.c * b.n - k * gb)];
@@ -374,13 +396,16 @@ impl Fit {
         let structured = ratio < 2.0 - SIGMAS * 2.0 / count.sqrt();
         let inflation = inflation(ratio, TOGETHER);
         let noise = squares / (count - PARAMETERS).max(1.0);
-        if self.best.s2 - self.best.s1 < curve.width_mm() {
+        if self.unseen.is_none() && self.best.s2 - self.best.s1 < curve.width_mm() {
             // One straight line: only its slope is known, and the kink lies where the spring's torque passes zero.
             let (t, zero) = (self.best, 0.5 * (self.levels.before + self.levels.after) + self.levels.motor);
             let middle = 0.5 * (t.s1 + t.s2) + (zero - t.c) / t.k;
             self.best = Trial { s1: middle, s2: middle, c: zero, ..t };
         }
-        let fitted = self.derive(curve, noise, inflation, structured);
+        let fitted = match self.unseen {
+            None => self.derive(curve, noise, inflation, structured),
+            Some(unseen) => self.derive_unseen(curve, noise * inflation, unseen, structured, noise),
+        };
         let better = match (&self.chosen, &fitted) {
             (_, None) => false,
             (None, Some(_)) => true,
@@ -396,12 +421,22 @@ impl Fit {
 
     /// Sets up the rounded fit over the largest share that the curve reaches.
     fn round_off(&mut self, curve: &Curve) -> Stage {
+        if let (None, Some(unseen)) = (self.unseen, self.find_unseen(curve)) {
+            return self.begin_unseen(curve, unseen);
+        }
         let end = self.ends.iter().filter(|end| **end != usize::MAX).max();
         let (Some(_), Some(end)) = (&self.chosen, end) else { return Stage::Done };
         let (width, end) = (curve.width_mm(), (*end).min(curve.used()));
         // The motor's own friction gives way too as it turns round, and would bend the beginning alike.
         let turned = (self.turned * self.line.s1.max(0.0) * curve.bins_per_mm()) as usize;
-        self.rounding.start(self.line, self.levels, self.first.max(turned).min(end), end, width);
+        self.rounding.start(
+            self.line,
+            self.levels,
+            self.first.max(turned).min(end),
+            end,
+            width,
+            self.unseen.map(|u| u.returned),
+        );
         Stage::Round
     }
 
@@ -452,6 +487,7 @@ impl Fit {
             noise: noise.sqrt(),
             share: SHARES[self.share.min(SHARES.len() - 1)],
             structured,
+            turn_error: 0.0,
             rounded: None,
         })
     }

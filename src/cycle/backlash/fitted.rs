@@ -48,6 +48,9 @@ pub struct Fitted {
     pub noise: f64,
     /// Share of the wind-up, from the clearance up, that was used.
     pub share: f64,
+    /// Standard deviation of the lost motion from what the drive was wound at the turn, mm, the same in every repeat; 0 where the release
+    /// is on the curve.
+    pub turn_error: f64,
     /// True when residuals show structure at every share: the curve has not the expected shape.
     pub structured: bool,
     /// The same curve with the table's presliding; `None` where that cannot be told.

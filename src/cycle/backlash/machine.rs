@@ -1,8 +1,8 @@
 //! The state machine of a lost-motion measurement: one call per servo cycle.
 //!
 //! ```text
-//! Idle → Begin → Clear → for each reversal (Approach → SlideBack → SlideIn → Settle → Scan → Unwind → ProbeBack → Unwind → ProbeForth →
-//!                                   Evaluate) → Write → Done
+//! Idle → Begin → Clear → for each reversal (Approach → SlideBack → SlideIn → CreepIn → Settle → Scan → Unwind → ProbeBack → Unwind →
+//!                                   ProbeForth → Evaluate) → Write → Done
 //!          any state ──fault, abort, deadline, refusal──▶ leave: Stopping → Restore → Failed
 //! ```
 //!
@@ -41,8 +41,10 @@ enum Phase {
     Approach,
     /// Ends `run_in` behind the reference.
     SlideBack,
-    /// Ends at the reference.
+    /// Ends a creep before the reference.
     SlideIn,
+    /// Ends at the reference: so slowly that neither the table's inertia nor the servo's overshoot releases the wind-up.
+    CreepIn,
     /// Ends when the rest is over.
     Settle,
     /// Ends when the torque no longer grows.
@@ -112,6 +114,8 @@ pub struct Backlash {
     /// Measured and commanded position where the present scan turned.
     turn: f64,
     turn_command: f64,
+    /// Furthest that the motor came before the scan, in the sense of the scan: the lowest.
+    furthest: f64,
     profile: Profile,
     last_position: f64,
     smallest_change: f64,
@@ -153,6 +157,7 @@ impl Default for Backlash {
             sense: 1.0,
             turn: 0.0,
             turn_command: 0.0,
+            furthest: f64::INFINITY,
             profile: Profile::default(),
             last_position: 0.0,
             smallest_change: f64::INFINITY,
@@ -435,7 +440,7 @@ impl Backlash {
             Phase::Begin | Phase::Clear => GIB_BACKLASH_CLEAR,
             Phase::Approach => GIB_BACKLASH_APPROACH,
             Phase::SlideBack => GIB_BACKLASH_SLIDE_BACK,
-            Phase::SlideIn => GIB_BACKLASH_SLIDE_IN,
+            Phase::SlideIn | Phase::CreepIn => GIB_BACKLASH_SLIDE_IN,
             Phase::Settle => GIB_BACKLASH_SETTLE,
             Phase::Scan => GIB_BACKLASH_SCAN,
             Phase::Unwind { .. } | Phase::ProbeBack | Phase::ProbeForth => GIB_BACKLASH_PROBE,

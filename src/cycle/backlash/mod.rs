@@ -13,7 +13,7 @@
 //! | [`io`] | what crosses the boundary in a cycle |
 //! | [`machine`] | the state machine called once per servo cycle |
 //! | [`curve`] | torque against travel |
-//! | [`fit`] (its normal equations in `cholesky`), [`peak`] | lost motion from a curve: ours and the published rule |
+//! | [`fit`] (its normal equations in `cholesky`, a release before the scan in `fit/unseen`), [`peak`] | lost motion from a curve: ours and the published rule |
 //! | [`fitted`] | what a fit starts from, and what it finds |
 //! | [`rounding`] | the table's presliding, from the same curve |
 //! | [`uncertainty`] | what repeats, reversals alike and the shape of the presliding leave open |

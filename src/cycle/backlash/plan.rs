@@ -75,6 +75,10 @@ pub struct Plan {
 /// Batches that a sliding level is cut into.
 const LEVEL_BATCHES: f64 = 12.0;
 
+/// Way of the creep to the reversal, mm. A stop from the slide takes back what the servo overshoots, and the table's inertia unwinds
+/// the drive; both go by the speed, and are a tenth or less from the slow feed. The way takes up again what the stop before it released.
+pub const CREEP: f64 = 0.1;
+
 impl Plan {
     /// What holds before the first start.
     pub const REST: Plan = Plan {
@@ -192,10 +196,10 @@ impl Plan {
     }
 
     /// Way of a slide: take-up of the lost motion and of the servo's lag, the stretch where the level is read, and room to reach the speed
-    /// and to brake.
+    /// and to brake, and the creep to the reversal.
     #[must_use]
     pub fn run_in(&self) -> f64 {
-        self.slide + self.limit + self.lag_limit + 2.0 * self.slide_speed * self.slide_speed / self.acceleration
+        CREEP + self.slide + self.limit + self.lag_limit + 2.0 * self.slide_speed * self.slide_speed / self.acceleration
     }
 
     /// Furthest that a command goes from the reversal during scan and probe.

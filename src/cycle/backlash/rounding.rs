@@ -86,6 +86,8 @@ pub struct Rounding {
     largest: f64,
     /// Too few bins in the clearance to see its level and width: they stay as they were.
     tied: bool,
+    /// The release is not on the curve: the way that the motor had come back before it; else `None`.
+    returned: Option<f64>,
     first: usize,
     end: usize,
     bin: usize,
@@ -109,8 +111,10 @@ fn bend(u: f64) -> (f64, f64) {
 }
 
 impl Rounding {
-    /// Begins with the straight fit over the bins `first..end`; `width` is that of a bin, mm.
-    pub fn start(&mut self, line: Line, levels: Levels, first: usize, end: usize, width: f64) {
+    /// Begins with the straight fit over the bins `first..end`; `width` is that of a bin, mm. `returned` (mm) tells that the curve begins
+    /// beyond the release, so far from where the motor turned.
+    pub fn start(&mut self, line: Line, levels: Levels, first: usize, end: usize, width: f64, returned: Option<f64>) {
+        self.returned = returned;
         self.levels = levels;
         self.change = levels.spring_change();
         self.tied = line.s2 - line.s1 < 2.5 * width;
@@ -164,7 +168,7 @@ impl Rounding {
     #[inline(always)]
     fn add(&mut self, n: f64, s: f64, torque: f64) {
         let [c, k, s1, s2, q] = self.trial;
-        let release = s < s1;
+        let release = s < s1 && self.returned.is_none();
         let (mut model, mut gradient) = (c, [1.0, 0.0, 0.0, 0.0, 0.0]);
         if release || s > s2 {
             let (h0, slope0) = bend(self.share(c));
@@ -252,7 +256,13 @@ impl Rounding {
     /// The normal equations. With a clearance too short to see, its width and level stand.
     fn system(&self) -> Option<Cholesky<PARAMETERS>> {
         let mut matrix = self.best_sums.matrix;
-        if self.tied {
+        if self.returned.is_some() {
+            // No bin lies before the first kink, and the level is that of the beginning.
+            matrix[2][2] = 1.0;
+            if self.tied {
+                matrix[3][3] += 1e3 * matrix[3][3];
+            }
+        } else if self.tied {
             let stiff = 1e3 * (matrix[2][2] + matrix[3][3]);
             matrix[2][2] += stiff;
             matrix[3][3] += stiff;
@@ -263,17 +273,24 @@ impl Rounding {
     }
 
     fn derive(&mut self) {
-        let [_, k, s1, s2, _] = self.best;
+        let [c, k, s1, s2, q] = self.best;
         let Some(system) = self.system() else { return };
         let sums = &self.best_sums;
         let ratio = if sums.squares > 0.0 { sums.differences / sums.squares } else { 2.0 };
         let noise = sums.squares / (sums.count - PARAMETERS as f64).max(1.0);
         let scale = noise * inflation(ratio, TOGETHER);
-        let gradient = [0.0, -self.change / (k * k), -1.0, 1.0, 0.0];
+        let windup = self.change / k;
+        let (mut lost_motion, mut gradient) = (s2 - s1 + windup, [0.0, -windup / k, -1.0, 1.0, 0.0]);
+        if let Some(returned) = self.returned {
+            // From the turn on the table gave way too, by q·h up to where the spring was slack.
+            let (h0, slope0) = bend(self.share(c));
+            let wound = (self.levels.after - c) / k;
+            lost_motion = (returned + s2 + wound - q * h0).max(windup);
+            gradient = [-1.0 / k - q * slope0 / self.change, -wound / k, 0.0, 1.0, -h0];
+        }
         let fit_variance = scale * system.inverse_form(gradient);
         let variance = fit_variance + self.levels.variance / (k * k);
-        let clearance = s2 - s1;
-        let lost_motion = clearance + self.change / k;
+        let clearance = lost_motion - windup;
         let sound = lost_motion.is_finite() && variance.is_finite() && variance >= 0.0;
         self.found = sound.then_some(Rounded { lost_motion, variance, fit_variance, clearance, stiffness: k });
     }

@@ -153,6 +153,7 @@ pub struct Sense {
     sliding: f64,
     motor: f64,
     noise: f64,
+    turn_error: f64,
     peaks: f64,
     peak_sum: f64,
     steps: f64,
@@ -172,6 +173,7 @@ impl Sense {
         self.sliding += 0.5 * (levels.after - levels.before);
         self.motor += levels.motor;
         self.noise += fit.noise;
+        self.turn_error += fit.turn_error;
         self.structured += f64::from(u8::from(fit.structured));
         self.steps += steps;
         if let Some(position) = peak {
@@ -244,10 +246,11 @@ pub fn estimates(plan: &Plan, encoder: f64, senses: &[Sense; 2]) -> Estimates {
     let reversals = (senses[0].reversals + senses[1].reversals).max(1.0);
     let straight = (senses[0].straight.sum + senses[1].straight.sum) / reversals;
     let step = if plan.slow_feed { 0.0 } else { plan.step };
+    let turn_error = (senses[0].turn_error + senses[1].turn_error) / reversals;
     let grid = systematic(encoder, plan.bin, step, 0.0);
     // While the motor stands between steps the table creeps, which bends the curve as presliding does.
     let told = plan.slow_feed && give.told(grid);
-    let common = systematic(encoder, plan.bin, step, straight) + give.untold(grid, told);
+    let common = systematic(encoder, plan.bin, step, straight) + give.untold(grid, told) + turn_error * turn_error;
     let permille =
         if told { (1e3 * give.mean() / (straight - give.mean()).max(f64::MIN_POSITIVE)).min(1e6) } else { 0.0 };
     let presliding_permille = (permille + 0.5) as i32;

@@ -1,6 +1,7 @@
 //! The measuring states: what happens in a cycle of each, and what comes after it.
 
 use super::*;
+use crate::cycle::backlash::plan::CREEP;
 use crate::cycle::backlash::{curve, verdict};
 
 /// Bins that the peak rule sees in one cycle.
@@ -23,6 +24,7 @@ impl Backlash {
                     self.slide_back();
                 }
             }
+            Phase::CreepIn => self.creep(input),
             Phase::Settle => self.settle(input),
             Phase::EvaluatePeak { bin } => self.evaluate_peak(bin),
             Phase::EvaluateFit => {
@@ -107,9 +109,19 @@ impl Backlash {
     #[cold]
     fn end_slide(&mut self) {
         if self.phase == Phase::SlideBack {
-            let goal = self.references[self.index & 1];
+            let goal = self.references[self.index & 1] + self.sense * CREEP;
             self.move_to(Phase::SlideIn, goal, self.plan.slide_speed);
         } else {
+            self.furthest = f64::INFINITY;
+            self.move_to(Phase::CreepIn, self.references[self.index & 1], self.plan.feed.min(self.plan.slide_speed));
+        }
+    }
+
+    /// The drive is wound up again, so slowly that it stays so at the turn.
+    fn creep(&mut self, input: &BacklashInput) {
+        let arrived = self.profile.step();
+        self.see_furthest(input);
+        if arrived {
             let bin = self.plan.bin;
             self.curve_mut().start(bin);
             self.enter(Phase::Settle, f64::from(self.plan.settle));
@@ -119,12 +131,20 @@ impl Backlash {
     /// At rest the position dithers by the encoder's grid, if at all.
     fn settle(&mut self, input: &BacklashInput) {
         self.see_change(input);
+        self.see_furthest(input);
         // The curve is emptied while there is time: the last slices in the last cycles, the first one in the last.
         let slice = self.left.saturating_sub(1);
         self.curve_mut().clear(slice);
         if self.left == 1 {
             self.turn(input);
         }
+    }
+
+    /// Keeps the motor's furthest point before the scan: a servo that overshoots comes back from it, and may release the wind-up, before the
+    /// scan begins.
+    #[inline(always)]
+    fn see_furthest(&mut self, input: &BacklashInput) {
+        self.furthest = self.furthest.min(self.sense * input.position_mm);
     }
 
     /// Keeps the smallest change of position seen between two cycles: the encoder's grid, once the axis creeps.
@@ -324,7 +344,7 @@ impl Backlash {
             }
         }
         if bin + PEAK_SLICE >= curve.used() {
-            self.fit.start(self.levels, 0.0);
+            self.fit.start(self.levels, 0.0, Some((self.sense * self.turn - self.furthest).max(0.0)));
             self.enter(Phase::EvaluateFit, f64::from(Fit::slices_bound()));
         } else {
             self.phase = Phase::EvaluatePeak { bin: bin + PEAK_SLICE };

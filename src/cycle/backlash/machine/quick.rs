@@ -21,7 +21,7 @@ impl Backlash {
                 self.read_level(input);
                 true
             }
-            Phase::Approach => true,
+            Phase::Approach | Phase::CreepIn => true,
             _ => false,
         };
         if done {
