@@ -98,7 +98,7 @@ install: build ## into $(DESTDIR)$(PREFIX)
 	@test -n "$(DESTDIR)" || ldconfig 2>/dev/null || true
 
 # With their folders, so that the links of the README hold.
-DOCS := $(wildcard README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE docs/*.md docs/*.svg c-harness/kernel.h)
+DOCS := $(wildcard README.md CHANGELOG.md LICENSE-MIT LICENSE-APACHE docs/*.md docs/*.svg c-harness/kernel.h c-harness/plant.h)
 
 uninstall: ## remove exactly what install wrote
 	rm -f $(DESTDIR)$(INCLUDEDIR)/gib.h $(DESTDIR)$(LIBDIR)/pkgconfig/gib.pc $(DESTDIR)$(BINDIR)/gib

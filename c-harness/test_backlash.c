@@ -133,23 +133,17 @@ static void an_overshoot_hides_no_clearance(void **state)
     for (int i = 0; i < 4; i++) {
         bench *b = bench_new();
         plant_config axis = plant_default();
-        axis.stiffness_nm_mm = 900.0;
-        axis.motor_share = 0.0;
-        axis.clearance_mm = 0.03;
-        axis.motor_inertia_nm_s2_mm = 0.004;
-        axis.table_inertia_nm_s2_mm = 0.006;
-        axis.velocity_gain_nm_s_mm = 0.6;
-        axis.velocity_integral_time_s = 0.1;
+        axis.stiffness_nm_mm = 900.0, axis.clearance_mm = 0.03, axis.motor_share = 0.0;
+        axis.motor_inertia_nm_s2_mm = 0.004, axis.table_inertia_nm_s2_mm = 0.006;
+        axis.velocity_gain_nm_s_mm = 0.6, axis.velocity_integral_time_s = 0.1, axis.velocity_feedforward = 0.0;
         axis.position_gain_1_s = 12.0;
-        axis.velocity_feedforward = 0.0;
         axis.breakaway_ratio = axis.hold_ratio = 1.0;
         axis.torque_noise_nm = 0.01;
         /* Toward the motion before the scan. */
         axis.constant_nm = i % 2 ? 1.2 : -1.2;
         plant_init(&b->axis, &axis);
         gib_backlash_config c = quick_config();
-        c.one_direction = 1;
-        c.first_direction = i % 2 ? -1 : 1;
+        c.one_direction = 1, c.first_direction = i % 2 ? -1 : 1;
         c.mode = i / 2 ? GIB_BACKLASH_STEP : GIB_BACKLASH_SLOW_FEED;
         assert_int_equal(gib_backlash_start(b->gib, &c), GIB_OK);
         assert_int_equal(run(b), GIB_DONE);

@@ -4460,7 +4460,7 @@ typedef struct gib_api_table {
 
 #ifdef __cplusplus
 extern "C" {
-#endif // __cplusplus
+#endif /* __cplusplus */
 
 /**
  * Version of the interface that the loaded library serves; compare it with `GIB_ABI_VERSION` of the header.
@@ -6440,7 +6440,7 @@ int32_t gib_vibration_last_error(const struct gib_vibration *handle,
                                  struct gib_error_detail *detail);
 
 #ifdef __cplusplus
-}  // extern "C"
-#endif  // __cplusplus
+} /* extern "C" */
+#endif /* __cplusplus */
 
 #endif  /* GIB_H */

@@ -6,8 +6,8 @@ use std::path::Path;
 use support::{command, root, run};
 
 const COMPILERS: &[(&str, &str, &[&str])] = &[
-    ("gcc", "c", &["c99", "c11", "c17"]),
-    ("clang", "c", &["c99", "c11", "c17"]),
+    ("gcc", "c", &["c90", "c99", "c11", "c17"]),
+    ("clang", "c", &["c90", "c99", "c11", "c17"]),
     ("g++", "c++", &["c++11", "c++20"]),
     ("clang++", "c++", &["c++11", "c++20"]),
 ];

@@ -63,12 +63,13 @@ fn generate(texts: &[String]) -> String {
     let mut header = Vec::new();
     builder.generate().expect("cbindgen reads the sources").write(&mut header);
     let header = String::from_utf8(header).unwrap();
-    // A negative number is one operand, whatever stands beside it.
-    let define = |line: &str| match line.rsplit_once(" -") {
-        Some((name, digits)) if line.starts_with("#define ") => format!("{name} (-{digits})\n"),
+    // A negative number is one operand, whatever stands beside it; a compiler of C90 knows no comment to the end of a line.
+    let plain = |line: &str| match (line.rsplit_once(" -"), line.split_once(" // ")) {
+        (Some((name, digits)), _) if line.starts_with("#define ") => format!("{name} (-{digits})\n"),
+        (_, Some((code, comment))) if code.starts_with(['#', '}']) => format!("{} /* {comment} */\n", code.trim_end()),
         _ => format!("{line}\n"),
     };
-    header.lines().map(define).collect()
+    header.lines().map(plain).collect()
 }
 
 fn texts() -> Vec<String> {

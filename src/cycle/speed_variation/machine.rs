@@ -247,15 +247,6 @@ impl SpeedVariation {
         self.output.torque_nm = change * self.to_torque;
     }
 
-    /// Whether the motor has enough for a change in a cycle at a speed, and at lower ones, without friction's help. What is no
-    /// number is not enough.
-    #[inline(always)]
-    fn has(&self, change: f64, speed: f64) -> bool {
-        let [power, torque, used, viscous] = self.in_changes;
-        let needs = change.abs() + used + viscous * speed;
-        needs <= torque && needs * speed <= power
-    }
-
     /// Change toward the next corner, turned back at it as light is by a mirror, so that the period is kept exactly.
     /// From beyond a corner that was moved it comes back at the motor's own pace.
     #[inline(always)]

@@ -72,4 +72,13 @@ impl SpeedVariation {
         };
         ((way / rate) as i32).saturating_sub(1).max(0)
     }
+
+    /// Whether the motor has enough for a change in a cycle at a speed, and at lower ones, without friction's help. What is no
+    /// number is not enough.
+    #[inline(always)]
+    pub(super) fn has(&self, change: f64, speed: f64) -> bool {
+        let [power, torque, used, viscous] = self.in_changes;
+        let needs = change.abs() + used + viscous * speed;
+        needs <= torque && needs * speed <= power
+    }
 }
