@@ -14,7 +14,7 @@ mod sharper;
 mod trial;
 
 pub(super) use itself::settled;
-pub(super) use replays::{Over, mean, misses, strength};
+pub(super) use replays::{Over, Replays, mean, misses, strength};
 pub(super) use sharper::sharpened;
 
 use super::belief;
@@ -22,7 +22,7 @@ use super::causes::{ABOUT_REVERSALS, LAWS, Law, law};
 use super::excerpt::Excerpt;
 use super::experiment;
 use super::fit::Bench;
-use super::frame::{Columns, Frame};
+use super::frame::Frame;
 use super::gain;
 use super::holdout::Holdout;
 use super::judge::{Excess, LITTLE_LEFT, TOLERABLE_EXCESS, refuted, shows};
@@ -34,10 +34,9 @@ use super::show;
 use super::verdict::{Diagnosis, Finding, Verdict, confidence};
 use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
-use crate::plant::added::ByServo;
 use crate::plant::observed::Observed;
 use itself::Itself;
-use replays::{NOTHING, Replays, avoidable};
+use replays::{NOTHING, avoidable};
 use trial::{Refined, Trial, starts};
 
 /// A miss that the loop has something to say of: of more than twice what the encoder itself is off by.
@@ -73,7 +72,7 @@ const STAGE: &str = "asking the closed loop";
 /// [`Stopped`] when the watch's caller said so.
 pub fn completed(
     axis: &Axis,
-    (whole, holdout): (&Columns, Option<&Excerpt>),
+    (replays, holdout): (Option<&Replays>, Option<&Excerpt>),
     frame: &Frame,
     found: Diagnosis,
     watch: &Watch,
@@ -83,13 +82,12 @@ pub fn completed(
         found.findings.iter().map(|finding| finding.effect).filter(about).map(|effect| effect.cause()).collect();
     // Where more of these are there the loop misses by what their numbers are off by, for which another stands in.
     let silent = axis.effects.iter().any(about) || named.len() > 1;
-    let Some(known) = found.replay.as_ref().filter(|_| !silent) else { return Ok(found) };
-    let much = is_much(&misses(&known.error, statistics::reading_error(&whole.position)));
-    let Some(observed) = much.then(|| whole.observed()).flatten() else { return Ok(found) };
-    let servo = ByServo::of(axis, &observed);
-    let recording = (&observed, &servo);
-    let Some(replays) = Replays::new(recording, known, watch) else { return Ok(found) };
-    let Some(missed) = Missed::by(&found.extended, &replays) else { return Ok(found) };
+    let Some(replays) = replays.filter(|_| !silent) else { return Ok(found) };
+    let floor = statistics::reading_error(&replays.whole.columns.position);
+    if !is_much(&misses(&replays.known.error, floor)) {
+        return Ok(found);
+    }
+    let Some(missed) = Missed::by(&found.extended, replays) else { return Ok(found) };
     let without = |dropped: &[Cause]| {
         let stays = found.extended.effects.iter().filter(|effect| !dropped.contains(&effect.cause())).copied();
         found.extended.with_effects(stays.collect())
@@ -98,7 +96,7 @@ pub fn completed(
         let without = without(dropped);
         let base = belief::base_alone(&without);
         let machines = [&found.extended, &without];
-        let told = told(axis, &replays, (&frame.believing(&base), whole), (&missed, machines), watch)?;
+        let told = told(axis, replays, &frame.believing(&base), (&missed, machines), watch)?;
         Ok(told.filter(|(_, told)| !dropped.contains(&told.finding.effect.cause())))
     };
     // One that the torque names may stand in for another, and gives way to that. Friction that rises at low speed the torque shows in many
@@ -122,11 +120,11 @@ pub fn completed(
         let told = Told { finding: Finding { share: rest * told.finding.share, ..told.finding }, ..told };
         let base = belief::base_alone(&without);
         let frame = &frame.believing(&base);
-        if let Some(retold) = answered(axis, (recording, holdout), frame, (&replays, &without), (stays, told), watch)? {
+        if let Some(retold) = answered(axis, holdout, frame, (replays, &without), (stays, told), watch)? {
             return Ok(retold);
         }
     }
-    let note = note_of_miss(axis, &found, &observed, &replays.says(&missed.error, axis));
+    let note = note_of_miss(axis, &found, replays.recording.0, &replays.says(&missed.error, axis));
     let notes = found.notes.iter().cloned().chain(note).collect();
     Ok(Diagnosis { notes, ..found })
 }
@@ -161,7 +159,7 @@ impl Missed {
 /// The answer that stays with what the loop tells beside its machine; `None` where a hold-out refutes that.
 fn answered(
     axis: &Axis,
-    (recording, holdout): ((&Observed, &ByServo), Option<&Excerpt>),
+    holdout: Option<&Excerpt>,
     frame: &Frame,
     (replays, without): (&Replays, &Axis),
     (mut stays, told): (Diagnosis, Told),
@@ -177,13 +175,13 @@ fn answered(
             }
             gains
         }
-        None => gain::where_judged([axis, &told.by_half], recording, &replays.lies_in(JUDGES), watch)?,
+        None => gain::where_judged([axis, &told.by_half], replays.recording, &replays.lies_in(JUDGES), watch)?,
     };
     let base = belief::base_alone(&extended);
     let frame = &frame.believing(&base);
     let bench = Bench::new(frame, &Known::of(&extended, frame));
     let left = bench.fit(Vec::new());
-    let with_scale = recording.0.table_position.is_some();
+    let with_scale = replays.recording.0.table_position.is_some();
     let unexplained = unexplained(&bench, &left, &show::views(&bench, &left, &left), with_scale);
     stays.notes.push(told.note);
     stays.findings.push(told.finding);
@@ -213,7 +211,7 @@ struct Told {
 fn told(
     axis: &Axis,
     replays: &Replays,
-    (frame, whole): (&Frame, &Columns),
+    frame: &Frame,
     (Missed { error: before, misses, avoidable }, [named, extended]): (&Missed, [&Axis; 2]),
     watch: &Watch,
 ) -> Result<Option<(f64, Told)>, Stopped> {
@@ -243,7 +241,7 @@ fn told(
         && half.trial.acts_in_few_rows(frame)
         && !half.trial.is_stopped();
     let Some(by_half) = half.trial.on(frame, extended).filter(|_| explains) else { return Ok(None) };
-    let verdict = match by_torque((frame, whole), replays, [named, &by_half]) {
+    let verdict = match by_torque(frame, replays, [named, &by_half]) {
         Some(Verdict::PartlyExplained) if *gain < MOSTLY * mean(avoidable, JUDGES) => return Ok(None),
         Some(verdict) => verdict,
         None => return Ok(None),
@@ -321,7 +319,7 @@ fn promising(
 /// What the torque lets a machine with a cause more explain: all, if it then is off by no more than noise, or than a recording of that
 /// very machine would be, since behind a motor that is known to a step of its encoder a table swings by that step; a part, if it is off by
 /// no more than before; `None` where it gainsays the machine.
-fn by_torque((frame, whole): (&Frame, &Columns), replays: &Replays, [before, with]: [&Axis; 2]) -> Option<Verdict> {
+fn by_torque(frame: &Frame, replays: &Replays, [before, with]: [&Axis; 2]) -> Option<Verdict> {
     let [before, after] = [before, with].map(|axis| Excess::of_machine(axis, frame));
     // What the table does its scale shows.
     if after.of_channel(1) > before.of_channel(1).max(LITTLE_LEFT) {
@@ -331,7 +329,7 @@ fn by_torque((frame, whole): (&Frame, &Columns), replays: &Replays, [before, wit
     if after <= LITTLE_LEFT || after <= TOLERABLE_EXCESS && after <= before {
         return Some(Verdict::Explained);
     }
-    if Itself::of(replays, whole, with).leaves_as_much(frame) {
+    if Itself::of(replays, with).leaves_as_much(frame) {
         return Some(Verdict::Explained);
     }
     (after <= before).then_some(Verdict::PartlyExplained)
@@ -341,8 +339,10 @@ fn by_torque((frame, whole): (&Frame, &Columns), replays: &Replays, [before, wit
 mod tests {
     use super::replays::BLOCKS;
     use super::*;
+    use crate::diagnosis::frame::Columns;
     use crate::diagnosis::gain::HeldOut;
     use crate::diagnosis::left::{Left, Unexplained};
+    use crate::diagnosis::whole::Whole;
     use crate::machine::Machine;
     use crate::plant::moves::{Moves, Reach};
     use crate::plant::simulate::{Sensors, Setup, simulate};
@@ -379,7 +379,7 @@ mod tests {
         let extended = rig().with_effects(effects.to_vec());
         let bench = Bench::new(frame, &Known::of(&extended, frame));
         let watch = Watch::new(&|_, _| true);
-        let errors = HeldOut::new([&extended, &extended], whole, &bench, &watch).believed();
+        let errors = HeldOut::new([&extended, &extended], &Whole::new(&extended, whole), &bench, &watch).believed();
         let named = |&effect: &Effect| Finding {
             effect,
             deviations: vec![0.0; effect.values().len()],
@@ -418,7 +418,10 @@ mod tests {
         let base = belief::base_alone(&belief);
         let frame = Frame::new(&base, &thinned, None);
         let silent = found(named, &frame, whole);
-        let answer = completed(&belief, (whole, None), &frame, silent, &Watch::new(&|_, _| true)).unwrap();
+        let (watch, replay) = (Watch::new(&|_, _| true), silent.replay.clone());
+        let whole = Whole::new(&belief, whole);
+        let replays = Replays::new(&whole, replay.as_ref(), &watch);
+        let answer = completed(&belief, (replays.as_ref(), None), &frame, silent, &watch).unwrap();
         answer.findings.iter().map(|finding| finding.effect).collect()
     }
 

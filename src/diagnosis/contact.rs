@@ -48,8 +48,8 @@ pub fn settled(bench: &Bench, held_out: &HeldOut, found: Selection, watch: &Watc
     let mut taken = watch.each(&FROM_HARD_TO_SOFT, (0.91, 0.92), stage, |&hz| with_contact(&best, hz))?;
     taken.retain(|fit| rattles || fit.squares() <= ALIKE * best.squares());
     taken.push(best);
-    let error = |fit: &Fit| held_out.torque_error(fit).unwrap_or(f64::INFINITY);
-    let errors = if taken.len() > 1 { watch.each(&taken, (0.92, 0.92), stage, error)? } else { vec![0.0] };
+    let errors = if taken.len() > 1 { held_out.torque_errors(&taken, stage)? } else { vec![None] };
+    let errors: Vec<f64> = errors.into_iter().map(|error| error.unwrap_or(f64::INFINITY)).collect();
     let least = (0..taken.len()).rev().min_by(|&a, &b| errors[a].total_cmp(&errors[b])).unwrap_or(0);
     Ok(Selection { fit: taken.swap_remove(least), alike: fits, ..found })
 }

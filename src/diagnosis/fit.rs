@@ -21,6 +21,7 @@ use super::many::{add, dot};
 use crate::machine::Effect;
 use crate::plant::linear::decomposed;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use slopes::Side;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -146,7 +147,7 @@ impl<'f, 'a> Bench<'f, 'a> {
             let columns = regressors.iter().map(|trace| self.stack(trace)).collect();
             Part { law, shape, fixed, columns, resistance: resistance.clone(), sides: Arc::default() }
         };
-        shapes.into_iter().zip(terms).map(part).collect()
+        shapes.into_par_iter().zip(terms).map(part).collect()
     }
 
     /// What is left, channel by channel, in their own units; rows of the torque by their weight.

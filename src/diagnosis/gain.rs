@@ -2,14 +2,17 @@
 
 use super::belief;
 use super::fit::{Bench, Fit};
-use super::frame::{Columns, Frame};
+use super::frame::Frame;
 use super::progress::{Stopped, Watch};
 use super::replayed;
+use super::whole::Whole;
 use crate::machine::{Axis, Cause};
 use crate::plant::added::ByServo;
 use crate::plant::closed_loop::{Manner, predict_by};
+use crate::plant::motion::FEWEST_ROWS;
 use crate::plant::observed::Observed;
 use crate::plant::predict::{TorquePrediction, predict_torque};
+use std::ops::Range;
 
 /// RMS before and after, on rows that were not fitted.
 #[derive(Debug, Clone, PartialEq)]
@@ -118,7 +121,7 @@ pub struct HeldOut<'g, 'f, 'a> {
     kept: &'g Axis,
     bench: &'g Bench<'f, 'a>,
     watch: &'g Watch<'g>,
-    observed: Option<(Observed, ByServo)>,
+    recording: Option<(&'g Observed, &'g ByServo)>,
     /// The half that each row belongs to, see [`half_of_rows`].
     half: Vec<usize>,
     /// What each row's torque says of a law, see [`weight_of_rows`].
@@ -128,15 +131,12 @@ pub struct HeldOut<'g, 'f, 'a> {
 impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
     /// Of every row of the recording.
     #[must_use]
-    pub fn new([axis, kept]: [&'g Axis; 2], columns: &Columns, bench: &'g Bench<'f, 'a>, watch: &'g Watch<'g>) -> Self {
-        let observed = columns.observed();
-        let half = observed.as_ref().map_or_else(Vec::new, |observed| half_of_rows(bench, &observed.time_s));
-        let weight = observed.as_ref().map_or_else(Vec::new, |observed| weight_of_rows(bench.frame, &observed.time_s));
-        let observed = observed.map(|observed| {
-            let servo = ByServo::of(axis, &observed);
-            (observed, servo)
-        });
-        Self { axis, kept, bench, watch, observed, half, weight }
+    pub fn new([axis, kept]: [&'g Axis; 2], whole: &'g Whole, bench: &'g Bench<'f, 'a>, watch: &'g Watch<'g>) -> Self {
+        let recording = whole.recording();
+        let observed = recording.map(|(observed, _)| observed);
+        let half = observed.map_or_else(Vec::new, |observed| half_of_rows(bench, &observed.time_s));
+        let weight = observed.map_or_else(Vec::new, |observed| weight_of_rows(bench.frame, &observed.time_s));
+        Self { axis, kept, bench, watch, recording, half, weight }
     }
 
     /// What of the axis stays beside what is found.
@@ -148,7 +148,7 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
     /// Errors of the belief alone; `None` where nothing can be predicted.
     #[must_use]
     pub fn believed(&self) -> Option<Errors> {
-        let (observed, servo) = self.observed.as_ref()?;
+        let (observed, servo) = self.recording?;
         errors(self.axis, observed, servo)
     }
 
@@ -157,7 +157,7 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
     /// # Errors
     /// [`Stopped`] when the watch's caller said so.
     pub fn errors(&self, fit: &Fit) -> Result<Option<Errors>, Stopped> {
-        let Some((observed, servo)) = &self.observed else { return Ok(None) };
+        let Some((observed, servo)) = self.recording else { return Ok(None) };
         let mut machines: Vec<Axis> = (0..2).map(|half| fitted_without(self.kept, self.bench, fit, half)).collect();
         // Without a coefficient both halves have the same one.
         machines.dedup();
@@ -174,24 +174,31 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
     /// Times of all rows, measured less replayed position of a loop by its errors, and the measured one; `None` where none was replayed.
     #[must_use]
     pub fn misses<'e>(&'e self, errors: &'e Errors) -> Option<[&'e [f64]; 3]> {
-        let (observed, _) = self.observed.as_ref()?;
+        let (observed, _) = self.recording?;
         Some([&observed.time_s, errors.channels[1].as_ref()?, &observed.position])
     }
 
-    /// RMS of the torque while the axis moves, by a machine with this set of causes.
-    #[must_use]
-    pub fn torque_error(&self, fit: &Fit) -> Option<f64> {
-        let (observed, _) = self.observed.as_ref()?;
-        let prediction = predict_torque(&fitted_without(self.kept, self.bench, fit, NEITHER), observed).ok()?;
-        let moving = torque_errors(observed, &prediction);
-        let (sum, count) = moving.iter().filter(|e| e.is_finite()).fold((0.0, 0.0), |(s, n), e| (s + e * e, n + 1.0));
-        (count > 0.0).then(|| f64::sqrt(sum / count))
+    /// RMS of the torque while the axis moves, by machines with these sets of causes, in some stretches that all are compared in.
+    ///
+    /// # Errors
+    /// [`Stopped`] when the watch's caller said so.
+    pub fn torque_errors(&self, fits: &[Fit], stage: &'static str) -> Result<Vec<Option<f64>>, Stopped> {
+        let Some((observed, _)) = self.recording else { return Ok(vec![None; fits.len()]) };
+        let here = in_stretches(observed);
+        let error = |fit: &Fit| {
+            let prediction = predict_torque(&fitted_without(self.kept, self.bench, fit, NEITHER), &here).ok()?;
+            let moving = torque_errors(&here, &prediction);
+            let (sum, count) =
+                moving.iter().filter(|e| e.is_finite()).fold((0.0, 0.0), |(s, n), e| (s + e * e, n + 1.0));
+            (count > 0.0).then(|| f64::sqrt(sum / count))
+        };
+        self.watch.each(fits, (0.92, 0.92), stage, error)
     }
 
     /// What of the axis stays, and its recording, every row, with what that says of the servo.
     #[must_use]
     pub fn recording(&self) -> Option<(&Axis, (&Observed, &ByServo))> {
-        self.observed.as_ref().map(|(observed, servo)| (self.kept, (observed, servo)))
+        self.recording.map(|recording| (self.kept, recording))
     }
 
     /// The gains by which a law may be refuted.
@@ -244,6 +251,25 @@ fn half_of_rows(bench: &Bench, time_s: &[f64]) -> Vec<usize> {
         if t < begin(0) || t > last { NEITHER } else { half_of(block) }
     };
     time_s.iter().map(of).collect()
+}
+
+/// Stretches in which machines are compared, and rows of all of them.
+const STRETCHES: usize = 16;
+const ROWS_OF_STRETCHES: usize = 12_000;
+
+/// A recording of which only some stretches are known, spread over all of it.
+fn in_stretches(observed: &Observed) -> Observed {
+    let (rows, each) = (observed.time_s.len(), ROWS_OF_STRETCHES / STRETCHES);
+    if rows <= ROWS_OF_STRETCHES {
+        return observed.clone();
+    }
+    let begin = |i: usize| i * (rows - each) / (STRETCHES - 1);
+    let within = |stretch: &Range<usize>| {
+        let parts = observed.runs.iter().map(|run| run.start.max(stretch.start)..run.end.min(stretch.end));
+        parts.filter(|part| part.len() >= FEWEST_ROWS).collect::<Vec<_>>()
+    };
+    let runs: Vec<Range<usize>> = (0..STRETCHES).map(|i| begin(i)..begin(i) + each).flat_map(|s| within(&s)).collect();
+    if runs.is_empty() { observed.clone() } else { Observed { runs, ..observed.clone() } }
 }
 
 /// For each row the lesser weight of the two judged rows about it; NaN where rows between them are not judged.
@@ -323,4 +349,39 @@ pub fn ratio_of(before: &[f64], after: &[f64], sizes: &[f64]) -> (f64, f64, [f64
     let variance = (count - 1.0) / count * left_out.iter().map(|l| (l - mean).powi(2)).sum::<f64>();
     let half = 2.07 * variance.sqrt();
     ((b / n).sqrt(), (a / n).sqrt(), [(centre - half).exp(), (centre + half).exp()])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::Machine;
+    use crate::plant::moves::{Moves, Reach};
+    use crate::plant::simulate::{Setup, simulate};
+    use crate::recording::{Column, Recording};
+
+    #[test]
+    fn machines_are_compared_in_stretches_of_all_of_a_long_recording() {
+        let axis = Machine::parse(include_str!("../../examples/machines/believed.json")).unwrap().axes.remove(0);
+        let reach = Reach { start: 20.0, stroke: 200.0, speed: 250.0, acceleration: 2500.0 };
+        let command = Moves::built_in("test", &reach).unwrap().command(1e-3);
+        let trace = simulate(&axis, &command, &Setup::default()).unwrap();
+        let columns = vec![Column::new("x.position_mm", trace.position), Column::new("x.torque_nm", trace.torque)];
+        let whole = Observed::of(&Recording::from_columns("simulated", trace.time_s, columns).unwrap(), &axis).unwrap();
+        let rows = whole.time_s.len();
+        assert!(rows > 2 * ROWS_OF_STRETCHES, "{rows}");
+        // A gap of a second in the middle.
+        let gap = rows / 2..rows / 2 + 1000;
+        let broken = Observed { runs: vec![0..gap.start, gap.end..rows], ..whole.clone() };
+        let few = in_stretches(&broken);
+        let known: usize = few.runs.iter().map(Range::len).sum();
+        assert!((ROWS_OF_STRETCHES - gap.len()..=ROWS_OF_STRETCHES).contains(&known), "{known}");
+        assert!(few.runs.iter().all(|run| run.end <= gap.start || run.start >= gap.end));
+        assert!(few.runs.first().unwrap().start == 0 && few.runs.last().unwrap().end == rows);
+        // A short one is taken whole.
+        let short =
+            Observed { runs: vec![0..rows], time_s: whole.time_s[..ROWS_OF_STRETCHES].to_vec().into(), ..whole };
+        assert_eq!(in_stretches(&short).runs, short.runs);
+        let away = predict_torque(&axis, &few).unwrap();
+        assert!(torque_errors(&few, &away).iter().filter(|error| error.is_finite()).count() > 1000);
+    }
 }

@@ -12,7 +12,7 @@ use super::fit::{Bench, Fit};
 use super::followed::{self, is_followed};
 use super::foreign;
 use super::formulation::by_position;
-use super::frame::{Columns, Frame};
+use super::frame::Frame;
 use super::gain::{self, Errors, Gain, HeldOut, Replay};
 use super::known::Known;
 use super::progress::{Stopped, Watch};
@@ -21,6 +21,7 @@ use super::shared;
 use super::show::{self, Coordinate};
 use super::steady;
 use super::verdict::Verdict;
+use super::whole::Whole;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::physics::LEAST_SLOPE;
 
@@ -83,7 +84,7 @@ pub struct Judged {
 impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
     /// A judge of what is found on a bench about an axis, and beside what is kept of it; `whole` is the recording, every row.
     #[must_use]
-    pub fn new(axes: [&'j Axis; 2], whole: &Columns, bench: &'j Bench<'f, 'a>, watch: &'j Watch<'j>) -> Self {
+    pub fn new(axes: [&'j Axis; 2], whole: &'j Whole, bench: &'j Bench<'f, 'a>, watch: &'j Watch<'j>) -> Self {
         let (held_out, empty) = (HeldOut::new(axes, whole, bench, watch), bench.fit(Vec::new()));
         let believed = held_out.believed();
         Self { bench, watch, held_out, empty, believed }
@@ -105,22 +106,26 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             (found.fit, found.alike) = (without, Vec::new());
         }
         let Some(mut verdict) = self.explains(&found.fit) else { return Ok(self.too_little(&found)) };
-        let goes = match foreign::bends_table(self.bench, &self.empty, &found.fit) {
-            None => foreign::stands_for(self.bench, &self.empty, &found.fit, self.watch)?,
-            bent => bent,
+        let goes = || match foreign::bends_table(self.bench, &self.empty, &found.fit) {
+            None => foreign::stands_for(self.bench, &self.empty, &found.fit, self.watch),
+            bent => Ok(bent),
         };
+        // Mostly no such law stands for it, and what comes next takes as long.
+        let settled = || {
+            let settled = contact::settled(self.bench, &self.held_out, found.clone(), self.watch)?;
+            Ok((self.without_spring(&settled.fit), self.errors(&settled.fit)?, settled))
+        };
+        let (goes, (mut less, mut errors, settled)) = self.watch.both(goes, settled)?;
         if let Some(goes) = goes {
             return Ok(Judged { refutation: Some(imitation(&found.fit, goes)), ..self.nothing(&found) });
         }
-        found = contact::settled(self.bench, &self.held_out, found, self.watch)?;
-        let mut less = self.without_spring(&found.fit);
+        found = settled;
         // Below the noise floor there is nothing but what the encoder makes, which drives the simulation too.
         if let Some(less) = less.take_if(|less| Excess::of(self.bench, less, &found.fit).largest() <= 0.0) {
             (found.fit, found.alike) = (less, Vec::new());
             let Some(still) = self.explains(&found.fit) else { return Ok(self.too_little(&found)) };
-            verdict = still;
+            (verdict, errors) = (still, self.errors(&found.fit)?);
         }
-        let mut errors = self.errors(&found.fit)?;
         if let Some(less) = less {
             let without = self.errors(&less)?;
             let mut gains = self.held_out.gains(without.as_ref(), errors.as_ref());

@@ -52,6 +52,7 @@ mod steady;
 pub mod uncertainty;
 mod valleys;
 pub mod verdict;
+mod whole;
 
 pub use choice::axis_of;
 pub use excerpt::Excerpt;

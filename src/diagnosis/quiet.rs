@@ -19,6 +19,12 @@ const QUIETER: f64 = 0.5;
 /// How often the width is doubled at most.
 pub const MOST: usize = 3;
 
+/// Whether a quieter look is worth it after such an answer.
+#[must_use]
+pub fn may_hide_more(found: &Diagnosis) -> bool {
+    matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained | Verdict::UnknownCause)
+}
+
 /// The width of a low-pass that is twice as wide.
 #[must_use]
 pub fn wider(frame: &Frame) -> usize {

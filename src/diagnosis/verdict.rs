@@ -3,13 +3,13 @@
 //! `judge` decides what is to be named; here the answer is put together.
 
 use super::belief;
-use super::by_loop;
+use super::by_loop::{self, Replays};
 use super::causes::{LAWS, Law, law, loose_spring};
 use super::creep;
 use super::excerpt::Excerpt;
 use super::experiment;
 use super::fit::{Bench, Fit};
-use super::frame::{Columns, Frame};
+use super::frame::Frame;
 use super::gain::{Gain, Replay};
 use super::holdout::Holdout;
 use super::judge::{Judge, Judged, misleads, refutation, refuted, shows};
@@ -24,6 +24,7 @@ use super::replayed;
 use super::select::{Search, Selection};
 use super::show::{self, View};
 use super::uncertainty::{self, Sure};
+use super::whole::Whole;
 use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
 
@@ -136,6 +137,7 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
         return Ok(Diagnosis { notes, ..insufficient(axis, missing) });
     }
     watch.at(0.05, "reading the motion")?;
+    let whole = &Whole::new(axis, whole);
     let recorded = Recorded { axis, belief: axis, whole, holdout, watch };
     let mut found = answer(&recorded, &first, notes.clone())?;
     // Between a motor that winds up its drive and one that drags bristles these rows do not tell.
@@ -145,7 +147,7 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
     let look_wider = |frame: &Frame| without_swings(Frame::new(&base, &columns, Some(quiet::wider(frame))));
     let (way, mut wider) = rayon::join(
         || yields.then(|| creep::way(&first)).flatten(),
-        || may_hide_more(&found).then(|| look_wider(&first)),
+        || quiet::may_hide_more(&found).then(|| look_wider(&first)),
     );
     if let Some(way) = way {
         let frame = without_swings(Frame::yielding_over(&base, &columns, None, way));
@@ -158,7 +160,7 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
     }
     let (mut frame, mut heard, mut by_first) = (first.clone(), None, true);
     for _ in 0..quiet::MOST {
-        if !may_hide_more(&found) {
+        if !quiet::may_hide_more(&found) {
             break;
         }
         let wide = wider.take().unwrap_or_else(|| look_wider(&frame));
@@ -178,18 +180,16 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
         frame = wide;
     }
     // What a quieter look has heard the first does not judge.
-    let sharpened = if by_first { by_loop::sharpened(axis, (whole, holdout), &first, &found, watch)? } else { None };
-    if let Some(sharper) = sharpened {
-        return watch.at(1.0, "done").map(|()| sharper);
+    let known = found.replay.clone();
+    let replays = Replays::new(whole, known.as_ref(), watch);
+    if let Some(replays) = replays.as_ref().filter(|_| by_first) {
+        if let Some(sharper) = by_loop::sharpened(axis, (replays, holdout), &first, &found, watch)? {
+            return watch.at(1.0, "done").map(|()| sharper);
+        }
+        found = by_loop::settled(found, replays, &first);
     }
-    let found = if by_first { by_loop::settled(found, whole, &first, watch) } else { found };
-    let found = by_loop::completed(axis, (whole, holdout), &first, found, watch)?;
+    let found = by_loop::completed(axis, (replays.as_ref(), holdout), &first, found, watch)?;
     watch.at(1.0, "done").map(|()| found)
-}
-
-/// Whether a quieter look is worth it after such an answer.
-fn may_hide_more(found: &Diagnosis) -> bool {
-    matches!(found.verdict, Verdict::NoDiscrepancy | Verdict::Explained | Verdict::UnknownCause)
 }
 
 /// What an answer is about beside the equations.
@@ -197,7 +197,7 @@ struct Recorded<'d> {
     axis: &'d Axis,
     /// What of the axis is taken for granted.
     belief: &'d Axis,
-    whole: &'d Columns,
+    whole: &'d Whole<'d>,
     holdout: Option<&'d Excerpt>,
     watch: &'d Watch<'d>,
 }
@@ -308,7 +308,7 @@ fn answer_on(
         notes.push(join(band, &mut findings, axis, &fit));
     }
     let shown = show::views(bench, vibration.map_or(&empty, |band| &band.before), &fit);
-    let unexplained = unexplained(bench, &fit, &shown, whole.table.is_some());
+    let unexplained = unexplained(bench, &fit, &shown, whole.columns.table.is_some());
     Ok(Diagnosis {
         verdict,
         findings,

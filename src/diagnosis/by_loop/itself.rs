@@ -14,12 +14,10 @@ use crate::diagnosis::fit::Bench;
 use crate::diagnosis::frame::{Columns, Frame};
 use crate::diagnosis::judge::{Excess, LITTLE_LEFT};
 use crate::diagnosis::known::Known;
-use crate::diagnosis::progress::Watch;
 use crate::diagnosis::quiet;
 use crate::diagnosis::show::{self, Coordinate};
 use crate::diagnosis::verdict::{Diagnosis, Verdict, what_is_missing};
 use crate::machine::Axis;
-use crate::plant::added::ByServo;
 use std::cell::OnceCell;
 
 /// Variance that a machine leaves over what it leaves of a recording of its own, with the noise of this one, up to which that is as much.
@@ -59,7 +57,6 @@ impl Leaves {
 /// A machine beside recordings of its own, which are simulated when first asked for.
 pub struct Itself<'i> {
     replays: &'i Replays<'i>,
-    whole: &'i Columns,
     machine: &'i Axis,
     base: Axis,
     own: OnceCell<Vec<Columns>>,
@@ -68,13 +65,14 @@ pub struct Itself<'i> {
 impl<'i> Itself<'i> {
     /// Of a machine and the recording.
     #[must_use]
-    pub fn of(replays: &'i Replays<'i>, whole: &'i Columns, machine: &'i Axis) -> Self {
-        Self { replays, whole, machine, base: belief::base_alone(machine), own: OnceCell::new() }
+    pub fn of(replays: &'i Replays<'i>, machine: &'i Axis) -> Self {
+        Self { replays, machine, base: belief::base_alone(machine), own: OnceCell::new() }
     }
 
     /// What the machine leaves of its own recordings through the low-pass of a frame, the most of each; `None` where none is to be had.
     fn leaves(&self, frame: &Frame) -> Option<Leaves> {
-        let thinned = |[position, torque]: [Vec<f64>; 2]| self.whole.with_motion(position, torque).thinned();
+        let thinned =
+            |[position, torque]: [Vec<f64>; 2]| self.replays.whole.columns.with_motion(position, torque).thinned();
         let own = self.own.get_or_init(|| self.replays.recordings_of(self.machine).map(thinned).collect());
         let of = |columns| Leaves::of(self.machine, &Frame::new(&self.base, columns, Some(frame.low_pass.width)));
         let more = |a: Leaves, b: Leaves| Leaves {
@@ -88,7 +86,7 @@ impl<'i> Itself<'i> {
     /// Whether the machine leaves no more of a frame than of recordings of its own. A scale tells more of a table than they do.
     #[must_use]
     pub fn leaves_as_much(&self, frame: &Frame) -> bool {
-        if self.whole.table.is_some() {
+        if self.replays.whole.columns.table.is_some() {
             return false;
         }
         let measured = Leaves::of(self.machine, &frame.believing(&self.base));
@@ -98,7 +96,7 @@ impl<'i> Itself<'i> {
     /// With what more goes than of recordings of its own, and the share of the variance that does, of the quietest look that shows it.
     fn lives_in(&self, frame: &Frame) -> Option<(Coordinate, f64)> {
         let masses = self.machine.two_masses().ok()?;
-        let columns = self.whole.clone().thinned();
+        let columns = self.replays.whole.columns.clone().thinned();
         let mut look = frame.believing(&self.base);
         let mut shown = None;
         for turn in 0..LOOKS {
@@ -127,7 +125,7 @@ impl<'i> Itself<'i> {
 
 /// An answer by the look of a frame. One that doubts a machine, or leaves something beside what was found, by no more than a recording of
 /// its own would is put right, and one that finds nothing where more than that goes with a place or a time.
-pub fn settled(mut found: Diagnosis, whole: &Columns, frame: &Frame, watch: &Watch) -> Diagnosis {
+pub fn settled(mut found: Diagnosis, replays: &Replays, frame: &Frame) -> Diagnosis {
     let doubts = match found.verdict {
         Verdict::NoDiscrepancy => false,
         Verdict::UnknownCause => true,
@@ -138,11 +136,7 @@ pub fn settled(mut found: Diagnosis, whole: &Columns, frame: &Frame, watch: &Wat
     if doubts && Excess::of_machine(&found.extended, frame).largest() <= LITTLE_LEFT {
         return found;
     }
-    let Some(known) = &found.replay else { return found };
-    let Some(observed) = whole.observed() else { return found };
-    let servo = ByServo::of(&found.extended, &observed);
-    let Some(replays) = Replays::new((&observed, &servo), known, watch) else { return found };
-    let itself = Itself::of(&replays, whole, &found.extended);
+    let itself = Itself::of(replays, &found.extended);
     if doubts && !itself.leaves_as_much(frame) {
         return found;
     }

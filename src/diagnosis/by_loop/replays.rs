@@ -5,11 +5,13 @@ use crate::analysis::statistics;
 use crate::diagnosis::gain::{Replay, half_of};
 use crate::diagnosis::progress::Watch;
 use crate::diagnosis::uncertainty::widening;
+use crate::diagnosis::whole::Whole;
 use crate::machine::Axis;
 use crate::plant::added::ByServo;
 use crate::plant::closed_loop::{Part, rows_of_the_beginning};
 use crate::plant::observed::Observed;
 use crate::plant::simulate::Sensors;
+use once_cell::sync::OnceCell;
 use std::ops::Range;
 
 /// Contiguous blocks of rows. Each counts alike: where an axis that sticks breaks loose a cycle sooner or later one of them holds more
@@ -49,10 +51,17 @@ impl Over {
     }
 }
 
+/// By what a machine misses the measured position, and how far each block is missed whatever the machine.
+type ErrorAndUnavoidable = (Vec<f64>, Vec<f64>);
+
 /// What stays the same while machines are replayed.
 pub struct Replays<'r> {
-    known: &'r Replay,
-    recording: (&'r Observed, &'r ByServo),
+    /// What is replayed.
+    pub whole: &'r Whole<'r>,
+    /// The machine whose loop was replayed once.
+    pub known: &'r Replay,
+    /// What the recording shows.
+    pub recording: (&'r Observed, &'r ByServo),
     part: Part,
     begun: usize,
     /// Rows but for long rests.
@@ -60,16 +69,19 @@ pub struct Replays<'r> {
     /// What the encoder itself is off by, and the whole way of the axis, load units.
     floor: f64,
     stroke: f64,
+    /// What was worked out of the machine that was asked about first.
+    of_one: OnceCell<(Axis, Option<ErrorAndUnavoidable>)>,
     watch: &'r Watch<'r>,
 }
 
 impl<'r> Replays<'r> {
     /// Of a recording whose loop was replayed once; `None` where that cannot be told from anything.
     #[must_use]
-    pub fn new(recording: (&'r Observed, &'r ByServo), known: &'r Replay, watch: &'r Watch<'r>) -> Option<Self> {
+    pub fn new(whole: &'r Whole, known: Option<&'r Replay>, watch: &'r Watch<'r>) -> Option<Self> {
+        let (known, recording) = known.zip(whole.recording())?;
         let observed = recording.0;
-        let whole = Part::of_steps(&known.axis, observed, MOST_STEPS, 1.0);
-        let part = Part { rows: whole.rows.min(known.error.len()), ..whole };
+        let most = Part::of_steps(&known.axis, observed, MOST_STEPS, 1.0);
+        let part = Part { rows: most.rows.min(known.error.len()), ..most };
         let rows = part.rows;
         let begun = rows_of_the_beginning(known.axis.servo.as_ref()?, observed).min(rows / MOST_OF_ROWS);
         let heard = rows_but_for_long_rests(observed, rows);
@@ -79,7 +91,8 @@ impl<'r> Replays<'r> {
         }
         let known_ones = observed.position.iter().copied().filter(|x| x.is_finite());
         let (low, high) = known_ones.fold((f64::MAX, f64::MIN), |(low, high), x| (x.min(low), x.max(high)));
-        Some(Self { known, recording, part, begun, heard, floor, stroke: high - low, watch })
+        let (stroke, of_one) = (high - low, OnceCell::new());
+        Some(Self { whole, known, recording, part, begun, heard, floor, stroke, of_one, watch })
     }
 
     /// The same of fewer rows, for what is to be quick.
@@ -87,7 +100,7 @@ impl<'r> Replays<'r> {
     pub fn beginning(&self) -> Self {
         let short = Part::of_steps(&self.known.axis, self.recording.0, MOST_STEPS_TRIED, 1.0);
         let rows = short.rows.max(self.begun + 10 * BLOCKS).min(self.part.rows);
-        Self { part: Part { rows, ..short }, heard: self.heard[..rows].to_vec(), ..*self }
+        Self { part: Part { rows, ..short }, heard: self.heard[..rows].to_vec(), of_one: OnceCell::new(), ..*self }
     }
 
     /// Measured less replayed position of a machine with the ripples of the known one after the beginning; rows that are not known miss
@@ -100,7 +113,17 @@ impl<'r> Replays<'r> {
     /// The same, and how far each block of that machine is missed as it is replayed, since its servo follows what the encoder is off by: what
     /// no cause explains.
     #[must_use]
-    pub fn error_and_unavoidable(&self, axis: &Axis) -> Option<(Vec<f64>, Vec<f64>)> {
+    pub fn error_and_unavoidable(&self, axis: &Axis) -> Option<ErrorAndUnavoidable> {
+        // Who comes later often asks of the same machine.
+        if let Some((_, known)) = self.of_one.get().filter(|(of_one, _)| of_one == axis) {
+            return known.clone();
+        }
+        let found = self.and_unavoidable(axis);
+        _ = self.of_one.set((axis.clone(), found.clone()));
+        found
+    }
+
+    fn and_unavoidable(&self, axis: &Axis) -> Option<ErrorAndUnavoidable> {
         let sensed = || self.through(self.sensors().pop()?, axis);
         let (replayed, sensed) = rayon::join(|| self.replayed(axis), sensed);
         let (replayed, [sensed, _]) = replayed.zip(sensed)?;

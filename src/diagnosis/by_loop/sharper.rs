@@ -11,15 +11,13 @@ use super::{ABOUT_REVERSALS, GIVES, JUDGES, STAGE, Told, answered, by_torque};
 use crate::analysis::statistics;
 use crate::diagnosis::causes::law;
 use crate::diagnosis::excerpt::Excerpt;
-use crate::diagnosis::frame::{Columns, Frame};
+use crate::diagnosis::frame::Frame;
 use crate::diagnosis::gain;
 use crate::diagnosis::judge::refuted;
 use crate::diagnosis::progress::{Stopped, Watch};
 use crate::diagnosis::verdict::{Diagnosis, Verdict};
 use crate::diagnosis::{belief, verdict::Finding};
 use crate::machine::{Axis, Cause, Effect};
-use crate::plant::added::ByServo;
-use crate::plant::observed::Observed;
 
 /// Misses of the worse half of the blocks from which on the loop is asked: there the error is that of the encoder.
 const ASKED: f64 = NOTHING;
@@ -43,7 +41,7 @@ const ROUNDS: usize = 4;
 /// [`Stopped`] when the watch's caller said so.
 pub fn sharpened(
     axis: &Axis,
-    (whole, holdout): (&Columns, Option<&Excerpt>),
+    (replays, holdout): (&Replays, Option<&Excerpt>),
     frame: &Frame,
     found: &Diagnosis,
     watch: &Watch,
@@ -53,7 +51,7 @@ pub fn sharpened(
     let named = matches!(found.verdict, Verdict::Explained | Verdict::PartlyExplained);
     let parts_table = |finding: &&Finding| law(finding.effect.cause()).is_simulated();
     let parting: Vec<&Finding> = found.findings.iter().filter(parts_table).collect();
-    let ([parting], Some(known), true) = (parting.as_slice(), &found.replay, named && !believed) else {
+    let ([parting], true) = (parting.as_slice(), named && !believed) else {
         return Ok(None);
     };
     let cause = parting.effect.cause();
@@ -62,29 +60,25 @@ pub fn sharpened(
     if cause == Cause::DriveCompliance && shaken {
         return Ok(None);
     }
-    let missed = misses(&known.error, statistics::reading_error(&whole.position));
+    let missed = misses(&replays.known.error, statistics::reading_error(&replays.whole.columns.position));
     if [GIVES, JUDGES].iter().any(|half| mean_of_worse_half(&missed, *half) < ASKED) {
         return Ok(None);
     }
-    let Some(observed) = whole.observed() else { return Ok(None) };
-    let servo = ByServo::of(axis, &observed);
-    let Some(replays) = Replays::new((&observed, &servo), known, watch) else { return Ok(None) };
     let stays = found.extended.effects.iter().filter(|effect| effect.cause() != cause).copied();
     let without = found.extended.with_effects(stays.collect());
     let base = belief::base_alone(&without);
     let frame = &frame.believing(&base);
-    let on = (frame, whole, (&observed, &servo));
-    let told = told(&replays, on, [&found.extended, &without], (parting, found.verdict), watch)?;
+    let told = told(replays, frame, [&found.extended, &without], (parting, found.verdict), watch)?;
     let Some(told) = told else { return Ok(None) };
     let mut stays = found.clone();
     stays.findings.retain(|finding| finding.effect.cause() != cause);
-    answered(axis, ((&observed, &servo), holdout), frame, (&replays, &without), (stays, told), watch)
+    answered(axis, holdout, frame, (replays, &without), (stays, told), watch)
 }
 
 /// The same with the loop's numbers beside the second machine, where they are better than those that the first has.
 fn told(
     replays: &Replays,
-    (frame, whole, recording): (&Frame, &Columns, (&Observed, &ByServo)),
+    frame: &Frame,
     [named, without]: [&Axis; 2],
     (found, verdict): (&Finding, Verdict),
     watch: &Watch,
@@ -103,11 +97,11 @@ fn told(
     let by_half = half.trial.on(frame, without).filter(|_| better && !half.trial.is_stopped());
     let Some(by_half) = by_half else { return Ok(None) };
     // Torque and table must not gainsay it by what is predicted of them: behind the measured motor they are the encoder's.
-    let gains = gain::where_judged([named, &by_half], recording, &replays.lies_in(JUDGES), watch)?;
+    let gains = gain::where_judged([named, &by_half], replays.recording, &replays.lies_in(JUDGES), watch)?;
     if refuted(&gains, &[]) || gains.iter().any(|gain| gain.channel == "table_position" && gain.ci95[1] < 1.0) {
         return Ok(None);
     }
-    let verdict = by_torque((frame, whole), replays, [named, &by_half]).unwrap_or(verdict);
+    let verdict = by_torque(frame, replays, [named, &by_half]).unwrap_or(verdict);
     let Some(all) = half.trial.clone().refined(frame, without, replays, Over::All, f64::INFINITY) else {
         return Ok(None);
     };
@@ -170,6 +164,7 @@ fn widened(deviations: Vec<f64>, deepest: &Effect, alike: &[Effect]) -> Vec<f64>
 mod tests {
     use super::super::tests::{found, recorded, rig};
     use super::*;
+    use crate::diagnosis::whole::Whole;
 
     /// An answer's numbers as the loop has them, of the rig with what is hidden; `None` where they stay as they were.
     fn sharper(hidden: Effect, named: Effect, grid_um: f64) -> Option<Effect> {
@@ -179,7 +174,10 @@ mod tests {
         let base = belief::base_alone(&rig());
         let frame = Frame::new(&base, &thinned, None);
         let before = found(&[named], &frame, whole);
-        let after = sharpened(&rig(), (whole, None), &frame, &before, &Watch::new(&|_, _| true)).unwrap()?;
+        let (watch, axis) = (Watch::new(&|_, _| true), rig());
+        let whole = Whole::new(&axis, whole);
+        let replays = Replays::new(&whole, before.replay.as_ref(), &watch)?;
+        let after = sharpened(&axis, (&replays, None), &frame, &before, &watch).unwrap()?;
         assert!(after.findings.len() == 1 && after.extended.effects == [after.findings[0].effect]);
         println!("{:?} ± {:?}", after.findings[0].effect, after.findings[0].deviations);
         Some(after.findings[0].effect)

@@ -6,6 +6,7 @@
 
 use super::beside::orthonormalised;
 use super::{Bench, Fit, Part, dot, project};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Shares of a step that are tried.
@@ -88,10 +89,12 @@ impl Bench<'_, '_> {
             };
             let tried = self.parts_like(&part, SHARES.iter().map(along).collect());
             let tried = sides.into_iter().flat_map(|side| [side.up, side.down]).chain(tried);
-            let tried = tried
-                .map(|part| (self.left_beside(set, &part), part))
-                .map(|(left, part)| (dot(&left, &left), left, part));
-            let Some((squares, there, best)) = tried.min_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+            let rated = |part: Part| {
+                let left = self.left_beside(set, &part);
+                (dot(&left, &left), left, part)
+            };
+            let tried: Vec<_> = tried.collect::<Vec<_>>().into_par_iter().map(rated).collect();
+            let Some((squares, there, best)) = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { break };
             let gained = 1.0 - squares / dot(&left, &left);
             if gained > 0.0 {
                 (left, part) = (there, best);

@@ -26,21 +26,29 @@ pub struct Child<'s> {
     pub price: f64,
     /// A start of the same cause in another valley, which may be deeper than it shows.
     elsewhere: Option<Part>,
+    /// The set with it, refined, once somebody has asked.
+    fit: OnceCell<Fit>,
 }
 
 impl<'s> Child<'s> {
     /// A cause beside a set, whose figure it brings to another.
     fn new(set: &'s Fit, part: &Part, figure: f64, elsewhere: Option<Part>) -> Self {
-        Self { set, part: part.clone(), price: price(set) + figure - set.figure(), elsewhere }
+        Self { set, part: part.clone(), price: price(set) + figure - set.figure(), elsewhere, fit: OnceCell::new() }
     }
 
-    /// The set with it, from its best start, and from one in another valley if that leaves much; see [`refined`] for the squares.
+    /// The set with it, from its best start, and from one in another valley if that leaves much; see [`refined`] for the squares, of
+    /// which who asks first says how many.
     #[must_use]
     pub fn refined(&self, bench: &Bench, squares: f64) -> Fit {
+        if let Some(fit) = self.fit.get() {
+            return fit.clone();
+        }
         let from = |part: &Part| refined(bench, self.set, part.clone(), squares);
         let fit = from(&self.part);
         let other = self.elsewhere.as_ref().filter(|_| leaves_much(bench, &fit)).map(from);
-        other.filter(|other| price(other) < price(&fit) && is_physical(bench, other)).unwrap_or(fit)
+        let fit = other.filter(|other| price(other) < price(&fit) && is_physical(bench, other)).unwrap_or(fit);
+        _ = self.fit.set(fit.clone());
+        fit
     }
 
     /// All causes of it.
