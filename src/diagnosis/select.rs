@@ -248,8 +248,8 @@ fn grow(search: &Search, beam: &[Fit], (from, to): (f64, f64)) -> Result<Vec<Fit
     let stood_in: Vec<Fit> = beam.iter().take(1).filter_map(|set| without_stand_in(bench, set)).collect();
     let in_its_place = |set| laws.iter().filter(|law| law.is_simulated()).map(move |law| (set, *law));
     let open = open.chain(stood_in.iter().flat_map(in_its_place));
-    // A set whose table, or what imitates one, leaves little leaves nothing for another table to tell.
-    let settled = beam.first().is_some_and(|best| has_to_do_with_tables(best) && !leaves_much(bench, best));
+    // A set whose table leaves little, or that which imitates one and does so alone, leaves nothing for another table to tell.
+    let settled = beam.first().is_some_and(|best| tells_of_tables(best) && !leaves_much(bench, best));
     let open = open.filter(|(_, law)| !(settled && law.is_simulated()));
     let (tables, by_rows): (Vec<_>, Vec<_>) = open.partition(|(_, law): &(&Fit, &Law)| law.is_simulated());
     let at = |share: f64| from + share * (to - from);
@@ -295,9 +295,9 @@ fn leaves_much(bench: &Bench, set: &Fit) -> bool {
     Excess::of(bench, set, set).largest() > LITTLE_LEFT
 }
 
-/// Whether a cause of a set is a table, or turns one round.
-fn has_to_do_with_tables(set: &Fit) -> bool {
-    set.table().is_some() || set.parts.iter().any(|part| part.law.manner.turns_table)
+/// Whether a set has a table, or nothing but what turns one round: beside other causes that may have stood in for one.
+fn tells_of_tables(set: &Fit) -> bool {
+    set.table().is_some() || matches!(set.parts.as_slice(), [part] if part.law.manner.turns_table)
 }
 
 /// A set without what turns a table round, where it has that and no table.
