@@ -336,7 +336,7 @@ fn by_torque(frame: &Frame, replays: &Replays, [before, with]: [&Axis; 2]) -> Op
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::replays::BLOCKS;
     use super::*;
     use crate::diagnosis::frame::Columns;
@@ -349,12 +349,12 @@ mod tests {
     use crate::recording::{Column, Recording};
 
     /// The rig of the demonstration.
-    pub(super) fn rig() -> Axis {
+    pub(in crate::diagnosis) fn rig() -> Axis {
         Machine::parse(include_str!("../../examples/machines/believed.json")).unwrap().axes.remove(0)
     }
 
     /// What a recorder sees of the rig with effects, behind an encoder of this grid.
-    pub(super) fn recorded(effects: &[Effect], grid_um: f64) -> Excerpt {
+    pub(in crate::diagnosis) fn recorded(effects: &[Effect], grid_um: f64) -> Excerpt {
         recorded_over("test", effects, grid_um)
     }
 

@@ -16,6 +16,7 @@ use super::frame::Frame;
 use super::gain::{self, Errors, Gain, HeldOut, Replay};
 use super::known::Known;
 use super::progress::{Stopped, Watch};
+use super::rivals;
 use super::select::Selection;
 use super::shared;
 use super::show::{self, Coordinate};
@@ -137,6 +138,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
                 verdict = still;
             }
         }
+        (found, errors) = rivals::settled(self.bench, &self.held_out, (found, errors), self.watch)?;
         if let Some(of_bristle) = &errors {
             let bristle = (&found.fit, of_bristle);
             if let Some((fit, its)) = by_position::told(self.bench, &self.held_out, bristle, self.watch)? {

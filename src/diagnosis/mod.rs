@@ -42,6 +42,7 @@ pub mod progress;
 mod quiet;
 mod reopened;
 mod replayed;
+mod rivals;
 mod rows;
 pub mod sampling;
 pub mod select;

@@ -32,6 +32,8 @@ use starts::{Child, at_best_starts, at_seldom_starts};
 
 /// Sets that are carried on.
 const BEAM: usize = 2;
+/// Runners-up that are kept.
+const RIVALS: usize = 4;
 /// Causes refined for each set that grows.
 const TRIED: usize = 6;
 /// Most causes in a set.
@@ -129,7 +131,7 @@ impl<'s, 'f, 'a> Search<'s, 'f, 'a> {
 fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     let mut beam = vec![from];
     let mut best: Vec<Fit> = beam.clone();
-    let mut rivals = Vec::new();
+    let mut rivals: Vec<Fit> = Vec::new();
     for depth in 0..MOST {
         if best.last().is_some_and(|fit| is_lost_in_steps(search.bench, fit)) {
             break;
@@ -138,7 +140,9 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
         let share = |steps: usize| 0.8 - 0.65 * 0.4f64.powi(steps as i32);
         let mut grown = grow(search, &beam, (share(depth), share(depth + 1)))?;
         let Some(first) = grown.first() else { break };
-        if best.last().is_some_and(|fit| !is_more(price(fit), first)) {
+        if let Some(last) = best.last().filter(|fit| !is_more(price(fit), first)) {
+            // In the place of a cause another may do about as well.
+            rivals.extend(grown.into_iter().filter(|fit| fit.parts.len() == last.parts.len()));
             break;
         }
         // A cause that takes no more off than going to the bottom with those that are there would only stand in for that.
@@ -152,7 +156,7 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
         }
         let of_fewer = best.last().map_or(f64::INFINITY, price);
         best.push(first.clone());
-        rivals = grown.iter().skip(1).take(4).cloned().collect();
+        rivals = grown.iter().skip(1).take(RIVALS).cloned().collect();
         grown.truncate(if may_gain(search.bench, first) { BEAM } else { 1 });
         // What a set of fewer causes does as well has gone astray.
         grown.retain(|fit| price(fit) < of_fewer);

@@ -21,6 +21,7 @@ use super::progress::{Progress, Stopped, Watch, on_all_cores};
 use super::quiet;
 use super::reopened;
 use super::replayed;
+use super::rivals;
 use super::select::{Search, Selection};
 use super::show::{self, View};
 use super::uncertainty::{self, Sure};
@@ -487,13 +488,12 @@ fn ties(bench: &Bench, selection: &Selection, part: usize) -> Vec<Cause> {
     let own = fit.parts[part].law.cause;
     let others: Vec<Cause> = fit.parts.iter().flat_map(loose_spring::causes).collect();
     let mut list = Vec::new();
-    for rival in &selection.rivals {
+    for rival in selection.rivals.iter().filter(|rival| rivals::is_alike(bench, rival, fit)) {
         let strange: Vec<Cause> = rival.parts.iter().map(|p| p.law.cause).filter(|c| !others.contains(c)).collect();
         let lacks_own = !rival.parts.iter().any(|p| p.law.cause == own);
-        if let ([other], true) = (strange.as_slice(), lacks_own) {
-            if block_t(bench, rival, fit) < 2.0 && rival.figure() - fit.figure() < 0.02 && !list.contains(other) {
-                list.push(*other);
-            }
+        match strange.as_slice() {
+            [other] if lacks_own && !list.contains(other) => list.push(*other),
+            _ => (),
         }
     }
     list
