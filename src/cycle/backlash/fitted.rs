@@ -62,7 +62,7 @@ impl Fitted {
     #[must_use]
     pub fn straight(&self) -> Rounded {
         let Fitted { lost_motion, variance, clearance, stiffness, .. } = *self;
-        Rounded { lost_motion, variance, fit_variance: variance, clearance, stiffness }
+        Rounded { lost_motion, variance, fit_variance: variance, clearance, stiffness, level: None }
     }
 
     /// What the curve says, with the table's presliding taken off where it is `told` and can be.

@@ -299,7 +299,8 @@ const DISAGREEMENT: f64 = 3.6;
 /// # Errors
 /// `GIB_ERR_BACKLASH_SHAPE`, `GIB_ERR_BACKLASH_NOISE`.
 pub fn check_reversal(fit: Option<&Fitted>, torque_nm: f64) -> Result<Fitted, Fault> {
-    let Some(fit) = fit else { return Err(Fault::of(GIB_ERR_BACKLASH_SHAPE)) };
+    // A curve whose bend cannot be told does not tell what the table gives way either.
+    let Some(fit) = fit.filter(|fit| fit.rounded.is_some()) else { return Err(Fault::of(GIB_ERR_BACKLASH_SHAPE)) };
     // A slope that is not at least five standard errors from none cannot carry the wind-up.
     const SLOPE: f64 = 5.0;
     if fit.stiffness < SLOPE * fit.stiffness_error {
@@ -324,11 +325,22 @@ pub fn check_motor(fit: &Fitted, levels: &Levels, torque_nm: f64) -> Result<(), 
     /// Share of the wind-up from which a clearance shows a level of its own, and share of sliding that is the same.
     const CLEAR: f64 = 0.25;
     const SAME: f64 = 0.1;
-    let (apart, same) = ((fit.level - levels.motor).abs(), SAME * 0.5 * (levels.after - levels.before));
+    let (middle, change) = (0.5 * (levels.after + levels.before).abs(), levels.after - levels.before);
+    let level = if fit.clearance > CLEAR * fit.windup {
+        Some((fit.level, fit.level_error))
+    } else if middle < 0.5 * levels.spring_change() {
+        // A shorter one may be a bend of the table's, but for what the rounded curve has of it.
+        fit.rounded.and_then(|rounded| rounded.level)
+    } else {
+        // A load that no friction holds leaves no clearance to cross.
+        None
+    };
+    let Some((level, error)) = level else { return Ok(()) };
+    let (apart, same) = ((level - levels.motor).abs(), SAME * 0.5 * change);
     // The variance is that of twice the motor's friction, mostly.
-    let chance = (fit.level_error * fit.level_error + 0.25 * levels.variance).sqrt();
-    let allowed = same + (0.5 * (levels.after + levels.before).abs()).min(same) + DISAGREEMENT * chance;
-    if fit.clearance > CLEAR * fit.windup && apart > allowed {
+    let chance = (error * error + 0.25 * levels.variance).sqrt();
+    let allowed = same + middle.min(same) + DISAGREEMENT * chance;
+    if apart > allowed {
         let (code, field) = (GIB_ERR_BACKLASH_MOTOR_FRICTION, "motor_friction_difference_nm\0");
         return Err(Fault { code, field, value: apart * torque_nm, low: 0.0, high: allowed * torque_nm });
     }
@@ -383,4 +395,29 @@ pub fn check_result(
         return fault(GIB_ERR_BACKLASH_LIMIT, "amount_um\0", amount_um, 0.0, plan.compensation_max_um);
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_probe_is_held_against_a_short_clearance_that_shows() {
+        let levels = Levels { before: -1.4, after: 1.4, motor: 0.25, variance: 1e-6 };
+        let across = |level| Fitted {
+            clearance: 0.005,
+            windup: 0.055,
+            level: 0.5,
+            rounded: Some(Rounded { level, ..Rounded::default() }),
+            ..Fitted::default()
+        };
+        let code = |fit: &Fitted, levels: &Levels| check_motor(fit, levels, 1.0).map_err(|fault| fault.code);
+        assert_eq!(code(&across(Some((0.5, 0.01))), &levels), Err(GIB_ERR_BACKLASH_MOTOR_FRICTION));
+        assert_eq!(code(&across(Some((0.3, 0.01))), &levels), Ok(()));
+        // It may be a bend of the table's.
+        assert_eq!(code(&across(None), &levels), Ok(()));
+        // A load hangs on the table, and the drive is never slack.
+        let hangs = Levels { before: 1.0, after: 3.8, ..levels };
+        assert_eq!(code(&across(Some((2.4, 0.01))), &hangs), Ok(()));
+    }
 }

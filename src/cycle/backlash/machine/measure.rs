@@ -221,12 +221,13 @@ impl Backlash {
     /// The table slides, or the limit is reached before it did.
     #[cold]
     fn end_scan(&mut self, input: &BacklashInput, travel: f64) {
-        let (found, low) = (self.watch.highest, self.watch.low);
-        if found > low && travel < self.plan.limit {
+        let (found, low, limit) = (self.watch.highest, self.watch.low, self.plan.limit);
+        let slides = travel < limit || (self.watch.highest_at < limit && travel >= self.watch.end);
+        if found > low && slides {
             return self.probe_back(input);
         }
         self.leave(if found > low {
-            let (code, high) = (GIB_ERR_BACKLASH_LIMIT, 1e3 * self.plan.limit);
+            let (code, high) = (GIB_ERR_BACKLASH_LIMIT, 1e3 * limit);
             Fault { code, field: "travel_um\0", value: 1e3 * travel, low: 0.0, high }
         } else {
             Fault { code: GIB_ERR_BACKLASH_NO_RISE, field: "torque_share\0", value: found, low, high: f64::MAX }
@@ -321,9 +322,8 @@ impl Backlash {
     fn probed(&mut self) {
         self.profile.halt();
         let (twice, twice_variance) = self.probe.difference();
-        let change = self.after.mean() - self.before.mean();
         let motor = (0.5 * twice).max(0.0);
-        if let Err(fault) = self.probe.check(twice, twice_variance, change) {
+        if let Err(fault) = self.probe.check(twice, twice_variance, [self.before.mean(), self.after.mean()]) {
             return self.leave(fault);
         }
         self.levels = Levels {

@@ -27,6 +27,8 @@ pub(super) struct Watch {
     pub(super) news: f64,
     pub(super) margin: f64,
     pub(super) highest: f64,
+    /// Travel at which the highest reading was: from there on the table slides, if it does.
+    pub(super) highest_at: f64,
     /// Reading at which the wind-up has certainly begun, and one further up.
     pub(super) low: f64,
     high: f64,
@@ -71,6 +73,7 @@ impl Watch {
             news: -1.0,
             margin,
             highest: -1.0,
+            highest_at: 0.0,
             low,
             high,
             high_at: 0.0,
@@ -95,6 +98,7 @@ impl Watch {
     /// The reading has grown: the scan goes on for as long as growth may be hidden by noise or by a clearance.
     fn grow(&mut self, travel: f64, plan: &Plan) {
         self.highest = self.smooth;
+        self.highest_at = travel;
         self.news = self.smooth + self.margin;
         if self.high_at == 0.0 && self.smooth > self.high {
             self.high_at = travel;
@@ -106,7 +110,8 @@ impl Watch {
 
     fn go_on(&mut self, travel: f64, plan: &Plan) {
         let stall = (STALL_POINTS * plan.step).max(STALL_SHARE * travel);
-        self.end = plan.limit.min(travel + stall);
+        // The table must move within the limit; that it does is seen beyond.
+        self.end = if travel < plan.limit { travel + stall } else { travel };
     }
 
     /// Whether the table slides, where the scan has come to its end. A reading that has fallen was the motor's run into a
@@ -142,17 +147,20 @@ impl Probe {
         }
     }
 
-    /// Says whether the probe tells the motor's friction where the torque changes by `change` between sliding both ways: more than half
+    /// Says whether the probe tells the motor's friction where sliding takes `before` one way and `after` the other: more than half
     /// of the friction on the motor's side leaves too little wind-up to see; and a probe that cannot say is no probe; nor is
-    /// one whose torque is the same all the way, there and back: it is stuck.
+    /// one whose torque is the same all the way, there and back: it is stuck; nor one whose torque is beyond what sliding takes
+    /// either way, for the table sticks: it is not the drive's.
     ///
     /// # Errors
-    /// `GIB_ERR_BACKLASH_MOTOR_FRICTION` with the readings of a way, or with what it found as a share of `change`.
-    pub(super) fn check(&self, twice: f64, variance: f64, change: f64) -> Result<(), Fault> {
+    /// `GIB_ERR_BACKLASH_MOTOR_FRICTION` with the readings of a way, or with what it found as a share of the change between the two.
+    pub(super) fn check(&self, twice: f64, variance: f64, [before, after]: [f64; 2]) -> Result<(), Fault> {
         const LARGEST_SHARE: f64 = 0.55;
         const WORST_ERROR: f64 = 0.1;
         const STUCK: f64 = 1e-7;
         const FEWEST: f64 = 2.0;
+        const SIGMAS: f64 = 3.0;
+        let change = after - before;
         let fault =
             |field, value, low, high| Err(Fault { code: GIB_ERR_BACKLASH_MOTOR_FRICTION, field, value, low, high });
         let readings = self.back.n.min(self.forth.n);
@@ -172,6 +180,14 @@ impl Probe {
         if alive <= STUCK {
             return fault("probe_torque_ratio\0", alive, STUCK, f64::MAX);
         }
+        // The probe's own noise is no more than that of the difference.
+        let (low, high) = (-SIGMAS * error, 1.0 + SIGMAS * error);
+        for way in [&self.back, &self.forth] {
+            let level = (way.t / way.n - before) / change;
+            if !(level >= low && level <= high) {
+                return fault("probe_level_ratio\0", level, low, high);
+            }
+        }
         Ok(())
     }
 
@@ -188,5 +204,53 @@ impl Probe {
         let rest = |m: &Moments| m.tt - m.t * m.t / m.n - slope * with_way(m);
         let noise = (rest(b) + rest(f)).max(0.0) / (b.n + f.n - 3.0);
         (twice, noise * (1.0 / b.n + 1.0 / f.n + apart * apart / (spread(b) + spread(f))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a probe says of which the torque (N·m) at each µm back from the turn is `back` on its way back and `forth` on its way forth,
+    /// where the table slides at 10 N·m and at 80.
+    fn said(back: impl Fn(f64) -> f64, forth: impl Fn(f64) -> f64) -> Result<(), Fault> {
+        let mut probe = Probe::new(0.01, 0.04);
+        for i in 0..100 {
+            let (way, noise) = (1e-4 * f64::from(i), if i % 2 == 0 { 0.5 } else { -0.5 });
+            probe.add(way, false, back(1e3 * way) + noise);
+            probe.add(way, true, forth(1e3 * way) + noise);
+        }
+        let (twice, variance) = probe.difference();
+        probe.check(twice, variance, [10.0, 80.0])
+    }
+
+    #[test]
+    fn a_torque_that_no_table_takes_is_no_probe() {
+        assert_eq!(said(|way| 70.0 - way, |way| 80.0 - way), Ok(()));
+        // A load hangs on the table, and the torque has gone dead: it shows no friction of the motor's.
+        let fault = said(|_| 0.0, |_| 0.0).unwrap_err();
+        assert_eq!((fault.code, fault.field), (GIB_ERR_BACKLASH_MOTOR_FRICTION, "probe_level_ratio\0"));
+        assert!(fault.value < fault.low);
+        // The torque's zero has gone off on the way forth.
+        assert!(said(|way| 70.0 - way, |way| 95.0 - way).is_err());
+    }
+
+    #[test]
+    fn that_a_table_moves_within_the_limit_may_be_seen_beyond() {
+        let plan = Plan { limit: 0.03, step: 0.001, ..Plan::REST };
+        let rises_to = |last: f64| {
+            let mut watch = Watch::new(-1.0, 1.0, 0.0, 1.0, plan.limit);
+            let mut travel = 0.0;
+            while travel < watch.end {
+                watch.add(travel, -1.0 + 2.0 * (travel / last).min(1.0), &plan);
+                travel += 1e-4;
+            }
+            (watch.highest_at, travel)
+        };
+        let (moves, seen) = rises_to(0.025);
+        assert!(moves < 0.026 && seen > 0.039 && seen < 0.042, "moves at {moves}, seen at {seen}");
+        // What does not move within it is not waited for.
+        let (moves, seen) = rises_to(0.032);
+        assert!(moves >= plan.limit && seen < plan.limit + 0.002, "moves at {moves}, seen at {seen}");
     }
 }
