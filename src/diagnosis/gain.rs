@@ -1,11 +1,13 @@
 //! What the extended machine is worth on rows it was not fitted to, by the prediction that `gib predict` makes.
 
 use super::belief;
+use super::by_loop;
 use super::fit::{Bench, Fit};
 use super::frame::Frame;
 use super::progress::{Stopped, Watch};
 use super::replayed;
 use super::whole::Whole;
+use crate::analysis::statistics;
 use crate::machine::{Axis, Cause};
 use crate::plant::added::ByServo;
 use crate::plant::closed_loop::{Manner, predict_by};
@@ -176,6 +178,14 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
     pub fn misses<'e>(&'e self, errors: &'e Errors) -> Option<[&'e [f64]; 3]> {
         let (observed, _) = self.recording?;
         Some([&observed.time_s, errors.channels[1].as_ref()?, &observed.position])
+    }
+
+    /// How far each block of the position is missed, by what the encoder itself is off by, where a loop was replayed.
+    #[must_use]
+    pub fn missed(&self, errors: &Errors) -> Option<Vec<f64>> {
+        let [_, error, position] = self.misses(errors)?;
+        let floor = statistics::reading_error(position);
+        (floor > 0.0).then(|| by_loop::misses(error, floor))
     }
 
     /// RMS of the torque while the axis moves, by machines with these sets of causes, in some stretches that all are compared in.

@@ -2,13 +2,12 @@
 //! in the same few rows about a reversal, which the low-pass smears alike; a loop that is replayed with the wrong one of them misses the
 //! measured position by more.
 
-use super::by_loop::{Over, misses, strength};
+use super::by_loop::{Over, strength};
 use super::fit::{Bench, Fit};
 use super::gain::{Errors, HeldOut};
 use super::progress::{Stopped, Watch};
 use super::select::{Selection, is_physical, price};
 use super::verdict::block_t;
-use crate::analysis::statistics;
 
 /// Below this mean over scatter of what one set gains over another in each block, times √blocks, and this difference in their figures the
 /// torque does not tell them apart.
@@ -36,11 +35,7 @@ pub fn settled(
     (mut found, mut errors): (Selection, Option<Errors>),
     watch: &Watch,
 ) -> Result<(Selection, Option<Errors>), Stopped> {
-    let missed = |errors: &Errors| {
-        let [_, error, position] = held_out.misses(errors)?;
-        let floor = statistics::reading_error(position);
-        (floor > 0.0).then(|| misses(error, floor))
-    };
+    let missed = |errors: &Errors| held_out.missed(errors);
     let (alike, mut others): (Vec<Fit>, Vec<Fit>) =
         std::mem::take(&mut found.rivals).into_iter().partition(|rival| is_alike(bench, rival, &found.fit));
     for rival in alike {

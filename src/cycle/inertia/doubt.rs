@@ -128,15 +128,7 @@ mod tests {
             Block { torque: torque(i, truth), speed, acceleration }
         };
         let blocks: Vec<Block> = (0..160).map(block).collect();
-        let question = Question {
-            sample_s: 1e-3,
-            torque_step: 0.0,
-            speed_step: 0.0,
-            target: 0.05,
-            own: [0.0; 2],
-            process_step: 0,
-        };
-        let (balance, verdict) = fit(&blocks, 20, &question);
+        let (balance, verdict) = fit(&blocks, 20, &Question::PLAIN);
         verdict.map(|()| balance.inertia.value).map_err(|fault| (fault.code, fault.field))
     }
 

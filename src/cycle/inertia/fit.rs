@@ -27,6 +27,12 @@ pub struct Question {
     pub process_step: i32,
 }
 
+impl Question {
+    /// Of a machine without inertia of its own, sampled every millisecond by sensors without a step; to 5 %.
+    pub const PLAIN: Self =
+        Self { sample_s: 1e-3, torque_step: 0.0, speed_step: 0.0, target: 0.05, own: [0.0; 2], process_step: 0 };
+}
+
 /// A value and its expanded uncertainty (95 %).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Value {
@@ -419,9 +425,6 @@ fn blind_ramp(blocks: &[Block]) -> Ramp {
 mod tests {
     use super::*;
 
-    const QUESTION: Question =
-        Question { sample_s: 1e-3, torque_step: 0.0, speed_step: 0.0, target: 0.05, own: [0.0; 2], process_step: 0 };
-
     /// Trapezoids with J 0.3, B 0.02, Tc 4 and a scatter of 0.05.
     fn trapezoids() -> Vec<Block> {
         let block = |i: i32| {
@@ -443,19 +446,19 @@ mod tests {
         for i in [7, 50, 90, 131] {
             blocks[i].acceleration = 4000.0;
         }
-        let (balance, verdict) = fit(&blocks, 20, &QUESTION);
+        let (balance, verdict) = fit(&blocks, 20, &Question::PLAIN);
         assert_eq!(verdict, Ok(()));
         assert!((balance.inertia.value - 0.3).abs() < 2e-3 && balance.left_out == 4, "{balance:?}");
     }
 
     #[test]
     fn saturation_is_found_and_left_out_and_none_is_made_up() {
-        let (clean, _) = fit(&trapezoids(), 20, &QUESTION);
+        let (clean, _) = fit(&trapezoids(), 20, &Question::PLAIN);
         assert!(clean.saturation == 0.0 && clean.weakening == 0.0 && clean.both_ways, "{clean:?}");
         let mut blocks = trapezoids();
         let limit = 15.0;
         blocks.iter_mut().filter(|b| b.torque > limit).for_each(|b| b.torque += 0.8 * (b.torque - limit));
-        let (balance, verdict) = fit(&blocks, 20, &QUESTION);
+        let (balance, verdict) = fit(&blocks, 20, &Question::PLAIN);
         assert_eq!(verdict, Ok(()));
         assert!((balance.inertia.value - 0.3).abs() < 3e-3, "{balance:?}");
     }
@@ -470,7 +473,7 @@ mod tests {
             acceleration: [60.0, 0.0, -60.0, 0.0][i / 10 % 4],
         };
         let blocks: Vec<Block> = (0..160).map(block).collect();
-        let found = |torque_step| fit(&blocks, 20, &Question { torque_step, ..QUESTION }).0.inertia;
+        let found = |torque_step| fit(&blocks, 20, &Question { torque_step, ..Question::PLAIN }).0.inertia;
         let truth = 0.5 * (18.35 + 17.9) / 60.0;
         let (blind, fair) = (found(0.0), found(1.0));
         assert!((blind.value - truth).abs() > blind.uncertainty && (fair.value - truth).abs() < fair.uncertainty);
@@ -480,7 +483,7 @@ mod tests {
 
     #[test]
     fn few_blocks_and_wrong_signs_are_refused_by_name() {
-        let code = |blocks: &[Block]| fit(blocks, 20, &QUESTION).1.unwrap_err().code;
+        let code = |blocks: &[Block]| fit(blocks, 20, &Question::PLAIN).1.unwrap_err().code;
         assert_eq!(code(&trapezoids()[..11]), GIB_ERR_INERTIA_FEW);
         let mut turned = trapezoids();
         turned.iter_mut().for_each(|b| b.torque = -b.torque);

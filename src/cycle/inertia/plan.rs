@@ -71,14 +71,7 @@ impl Plan {
             torque_nm: 1.0,
             torque_bound: f64::MAX,
             lag_limit: f64::MAX,
-            question: Question {
-                sample_s: 1e-3,
-                torque_step: 0.0,
-                speed_step: 0.0,
-                target: 0.05,
-                own: [0.0; 2],
-                process_step: 0,
-            },
+            question: Question::PLAIN,
         }
     }
 

@@ -63,15 +63,7 @@ mod tests {
             Block { torque: torque(i, truth), speed: 60.0 + (i % 10) as f64, acceleration }
         };
         let blocks: Vec<Block> = (0..200).map(block).collect();
-        let question = Question {
-            sample_s: 1e-3,
-            torque_step: 0.0,
-            speed_step: 0.0,
-            target: 0.05,
-            own: [0.0; 2],
-            process_step: 0,
-        };
-        let (balance, verdict) = fit(&blocks, 20, &question);
+        let (balance, verdict) = fit(&blocks, 20, &Question::PLAIN);
         assert_eq!(verdict, Ok(()));
         (balance.inertia.value, balance.inertia.uncertainty)
     }

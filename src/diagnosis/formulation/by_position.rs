@@ -3,8 +3,7 @@
 //! creeps away and elements return, and its loop comes to rest elsewhere.
 
 use super::{OWN_STEPS, place};
-use crate::analysis::statistics;
-use crate::diagnosis::by_loop::{Over, is_much, mean, misses, strength};
+use crate::diagnosis::by_loop::{Over, is_much, mean, strength};
 use crate::diagnosis::causes::law;
 use crate::diagnosis::causes::presliding_friction::{BRISTLE, ELEMENTS_AS_BRISTLE, OF_ANY_EXPONENT};
 use crate::diagnosis::fit::{Bench, Fit};
@@ -32,12 +31,7 @@ pub fn told(
     watch: &Watch,
 ) -> Result<Option<(Fit, Errors)>, Stopped> {
     let Some(at) = place(fit) else { return Ok(None) };
-    let missed = |errors: &Errors| {
-        let [_, error, position] = held_out.misses(errors)?;
-        let floor = statistics::reading_error(position);
-        (floor > 0.0).then(|| misses(error, floor))
-    };
-    let before = missed(errors).filter(|before| is_much(before));
+    let before = held_out.missed(errors).filter(|before| is_much(before));
     let Some(before) = before else { return Ok(None) };
     let mut others = fit.parts.clone();
     let shape = others.remove(at).shape;
@@ -52,7 +46,7 @@ pub fn told(
     let mut best: Option<(f64, Fit, Errors)> = None;
     for own in tried.into_iter().flatten() {
         let Some(its) = held_out.errors(&own)? else { continue };
-        let Some(after) = missed(&its) else { continue };
+        let Some(after) = held_out.missed(&its) else { continue };
         let gained: Vec<f64> = before.iter().zip(&after).map(|(before, after)| before - after).collect();
         let gain = mean(&gained, Over::All);
         let least = best.as_ref().map_or(0.0, |(gain, ..)| gain + MORE * mean(&before, Over::All));
