@@ -15,12 +15,7 @@
 
 #include <cmocka.h>
 
-/* Runs of a test that has many: with clang, and so under its sanitizers, a fifth, since the library is the same and they are slower. */
-#ifdef __clang__
-#define FEWER(runs) ((runs) / 5)
-#else
-#define FEWER(runs) (runs)
-#endif
+#include "fewer.h"
 
 /* What came of all runs together. */
 typedef struct {

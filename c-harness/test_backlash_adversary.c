@@ -58,7 +58,7 @@ static const char *const LAWS[BACKLASH_MISTAKES] = {
 int main(int argc, char **argv)
 {
     const adversary_test test = {
-        .known_seed = 20260500, .known_runs = 150, .fresh_runs = 10,
+        .known_seed = 20260500, .known_runs = FEWER(150), .fresh_runs = 10,
         .least_met = 0.5, .least_ended = 0.5, .least_clean = 1.0,
         .right = RIGHT, .runs_a_wrong = 250, .held_from = 92, .held_to = 100, .most_refused = 5,
         .mistakes = BACKLASH_MISTAKES, .mistaken_runs = 100, .least = 3, .laws = LAWS,

@@ -56,7 +56,7 @@ static const char *const LAWS[INERTIA_MISTAKES] = {
 int main(int argc, char **argv)
 {
     const adversary_test test = {
-        .known_seed = 20260300, .known_runs = 250, .fresh_runs = 10,
+        .known_seed = 20260300, .known_runs = FEWER(250), .fresh_runs = 10,
         .least_met = 0.5, .least_ended = 0.5, .least_clean = 0.5,
         .right = RIGHT, .runs_a_wrong = 500, .held_from = 90, .held_to = 98, .most_refused = 5,
         .mistakes = INERTIA_MISTAKES, .mistaken_runs = 30, .least = 3, .laws = LAWS,

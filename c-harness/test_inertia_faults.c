@@ -3,6 +3,7 @@
  * fault (spindle and gib are plain data, so a copy is a fork), the fault is put in, and the fork is followed to its end.
  * Prints which fault ends how, and after how many cycles at most, in each state.
  */
+#include "fewer.h"
 #include "spindle_faults.h"
 
 enum inertia_fault {
@@ -199,7 +200,7 @@ static void inertia_every_fault_in_every_cycle(void **state)
                 /* What lasts to the end costs a whole run each time. */
                 /* A speed that is stuck while gib only listens cannot be told from one that is held. */
                 int listens_to_it = mode == GIB_INERTIA_LISTEN && (fault == SPEED_STUCK || fault == JAMMED);
-                if (!listens_to_it && (fault <= TORQUE_BOUND || cycle % 13 == 0)) {
+                if (!listens_to_it && cycle % (fault <= TORQUE_BOUND ? ONE_IN : 13 * ONE_IN) == 0) {
                     follow_inertia(&now, fault, cycle, &rows[fault]);
                 }
             }
