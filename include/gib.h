@@ -1497,7 +1497,7 @@ typedef struct gib_backlash_config {
      */
     double dwell_s;
     /**
-     * Speed of the slow feed, 0.001 to 5 mm/s (default 0.1).
+     * Speed of the slow feed, and of the last 0.1 mm of motor travel to each reversal, 0.001 to 5 mm/s (default 0.1).
      */
     double feed_mm_s;
     /**

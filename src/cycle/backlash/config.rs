@@ -48,7 +48,7 @@ pub struct BacklashConfig {
     pub step_um: f64,
     /// Time a step is held, 2 cycles to 1 s (default 0.02). The torque is read in its last quarter.
     pub dwell_s: f64,
-    /// Speed of the slow feed, 0.001 to 5 mm/s (default 0.1).
+    /// Speed of the slow feed, and of the last 0.1 mm of motor travel to each reversal, 0.001 to 5 mm/s (default 0.1).
     pub feed_mm_s: f64,
     /// Rest before each reversal, up to 10 s (default 0.2).
     pub settle_s: f64,
