@@ -76,17 +76,17 @@ pub fn direction_of(columns: &Columns, v: &[f64], a: &[f64], resolution: f64) ->
 /// back, since the axis may stick there for a moment.
 pub fn doubtful_rows(columns: &Columns, resting: Vec<bool>, resolution: f64) -> Vec<f64> {
     let mut doubt: Vec<f64> = resting.into_iter().map(|r| f64::from(u8::from(r))).collect();
-    for turn in turns(columns, resolution) {
+    for turn in turns(columns, resolution, 0.0) {
         doubt[turn].fill(1.0);
     }
     doubt
 }
 
-/// The rows of each turn: those about it at which the encoder shows no way.
-pub fn turns(columns: &Columns, resolution: f64) -> Vec<Range<usize>> {
+/// The rows of each turn between ways of so much at least, load units: those about it at which the encoder shows no such way.
+pub fn turns(columns: &Columns, resolution: f64, least: f64) -> Vec<Range<usize>> {
     let x = &columns.position;
     let rows_of = |s: &Range<usize>, turn: usize| {
-        let near = |i: usize| (x[i] - x[turn]).abs() < 2.5 * resolution;
+        let near = |i: usize| (x[i] - x[turn]).abs() < least.max(2.5 * resolution);
         let mut first = turn.saturating_sub(1).max(s.start);
         while first > s.start && near(first - 1) {
             first -= 1;
@@ -98,7 +98,7 @@ pub fn turns(columns: &Columns, resolution: f64) -> Vec<Range<usize>> {
         first..last + 1
     };
     let of_stretch = |s: &Range<usize>| {
-        let turns = turning_points(&x[s.clone()], TURN * resolution).into_iter();
+        let turns = turning_points(&x[s.clone()], least.max(TURN * resolution)).into_iter();
         turns.map(|turn| rows_of(s, s.start + turn)).collect::<Vec<_>>()
     };
     columns.stretches.iter().flat_map(of_stretch).collect()
