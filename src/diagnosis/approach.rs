@@ -6,31 +6,26 @@
 use super::causes::Law;
 use super::fit::{Bench, Fit, Part, figure};
 use super::many::dot;
-use super::turns::AboutTurns;
 use rayon::prelude::*;
 
 /// Times over which rows are summed, s, and how far apart the points of a slope are, in steps of each scale.
 const STAGES: [(f64, f64); 3] = [(0.05, 12.0), (0.02, 8.0), (0.006, 4.0)];
 /// Most moves in a stage.
 const MOVES: usize = 6;
-/// Least that a clearance takes off ln of the mean square of the sums of all rows for it to be moved on.
+/// Least that a clearance takes off ln of the mean square of the sums for it to be moved on.
 const LEAST: f64 = 0.02;
 
 /// The stages of an approach.
 #[derive(Debug)]
 pub struct Approach<'f, 'a> {
     stages: Vec<(Bench<'f, 'a>, f64)>,
-    /// The same of those about turns, where all of it is.
-    least: f64,
 }
 
 impl<'f, 'a> Approach<'f, 'a> {
     /// Of these equations.
     #[must_use]
     pub fn new(bench: &Bench<'f, 'a>) -> Self {
-        let AboutTurns { stretches, share } = AboutTurns::of(bench.frame);
-        let stages = STAGES.map(|(seconds, stride)| (bench.smoothed_in(&stretches, seconds), stride)).into();
-        Self { stages, least: LEAST / share }
+        Self { stages: STAGES.map(|(seconds, stride)| (bench.smoothed(seconds), stride)).into() }
     }
 
     /// The law at these starts on the sums, for [`Approach::from`].
@@ -52,13 +47,13 @@ impl<'f, 'a> Approach<'f, 'a> {
         let rated = starts.par_iter().map(|part| (squares(part), part));
         let (_, nearest) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
         // Starts lie so close that one of them takes off much of what a clearance makes.
-        if figure(&first.channels(&left(nearest))) > there.figure() - self.least {
+        if figure(&first.channels(&left(nearest))) > there.figure() - LEAST {
             return None;
         }
         let start = first.parts_under(nearest.law, vec![nearest.shape.clone()], &first.resistance_of(set)).pop()?;
         let mut part = first.approached(&there, start, *stride, MOVES);
         let shows = |bench: &Bench, set: &Fit, part: &Part| {
-            figure(&bench.channels(&bench.left_beside(set, part))) < set.figure() - self.least
+            figure(&bench.channels(&bench.left_beside(set, part))) < set.figure() - LEAST
         };
         if !shows(first, &there, &part) {
             return None;

@@ -50,8 +50,6 @@ pub struct Bench<'f, 'a> {
     resistance: Arc<Resistance>,
     /// Judged rows that are summed to one; none where rows are as they are.
     windows: Vec<Range<usize>>,
-    /// Stretches in which tables are simulated.
-    simulated: Vec<Range<usize>>,
 }
 
 /// A cause in a fit.
@@ -100,8 +98,7 @@ impl<'f, 'a> Bench<'f, 'a> {
         let (doubt, measured, windows) = (Vec::new(), Vec::new(), Vec::new());
         let certain = vec![1.0; rows + left.table.len()];
         let (free, resistance) = (Vec::new(), known.resistance.clone());
-        let simulated = frame.columns.stretches.clone();
-        let mut bench = Self { frame, measured, floors, doubt, certain, rows, free, resistance, windows, simulated };
+        let mut bench = Self { frame, measured, floors, doubt, certain, rows, free, resistance, windows };
         let doubt = bench.stack(&known.doubt);
         // A row errs by its noise and by what is believed there (generalised least squares).
         bench.certain = doubt.iter().map(|doubt| doubt.hypot(1.0).recip()).collect();
@@ -144,7 +141,7 @@ impl<'f, 'a> Bench<'f, 'a> {
     /// A cause under what resists a table.
     #[must_use]
     pub fn parts_under(&self, law: &'static Law, shapes: Vec<Vec<f64>>, resistance: &Arc<Resistance>) -> Vec<Part> {
-        let terms = law.terms_in(self.frame, &self.simulated, resistance, &shapes);
+        let terms = law.terms(self.frame, resistance, &shapes);
         let part = |(shape, Term { fixed, regressors }): (Vec<f64>, Term)| {
             let fixed = fixed.map(|trace| self.stack(&trace).into());
             let columns = regressors.iter().map(|trace| self.stack(trace)).collect();

@@ -11,7 +11,6 @@ mod coarse;
 mod colour;
 mod floor;
 mod swings;
-mod together;
 
 use super::filter::{LowPass, convolve, norm, of_three};
 use super::grids;
@@ -283,6 +282,30 @@ impl<'a> Frame<'a> {
     #[must_use]
     pub fn low_passed(&self, values: &[f64]) -> Vec<f64> {
         self.weighed(values, &self.low_pass_kernel, 0)
+    }
+
+    /// The same of several columns side by side.
+    #[must_use]
+    pub fn low_passed_together<const N: usize>(&self, values: &[[f64; N]]) -> [Vec<f64>; N] {
+        let kernel = &self.low_pass_kernel;
+        let mut columns: [Vec<f64>; N] = std::array::from_fn(|_| Vec::with_capacity(self.kept.len()));
+        widest(
+            #[inline(always)]
+            || {
+                for &row in &self.kept {
+                    let window =
+                        row.checked_sub(kernel.len() / 2).and_then(|from| values.get(from..from + kernel.len()));
+                    let mut sums = [0.0; N];
+                    for (value, weight) in window.unwrap_or_default().iter().zip(kernel) {
+                        for (sum, value) in sums.iter_mut().zip(value) {
+                            *sum += weight * value;
+                        }
+                    }
+                    columns.iter_mut().zip(sums).for_each(|(column, sum)| column.push(sum));
+                }
+            },
+        );
+        columns
     }
 
     /// Weighted sum of the rows about each judged row, `offset` rows later. The rows that are not judged are not worked out.

@@ -86,7 +86,7 @@ pub fn in_table(frame: &Frame) -> f64 {
     let made = |sensor: &Sensor| {
         let errors = OFFSETS.map(|offset| place.error_of(sensor, offset));
         let rows: Vec<[f64; OFFSETS.len()]> = (0..table.len()).map(|i| errors.each_ref().map(|e| e[i])).collect();
-        let filtered = frame.low_passed_together(&columns.stretches, &rows);
+        let filtered = frame.low_passed_together(&rows);
         filtered.iter().map(|made| mean_square(made)).sum::<f64>() / OFFSETS.len() as f64
     };
     let creeping = encoder.grid.hypot(scale.grid) / (12f64.sqrt() * columns.rows_in_one());

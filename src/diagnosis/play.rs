@@ -10,7 +10,6 @@ use super::judge::{Excess, LITTLE_LEFT};
 use super::many::dot;
 use super::progress::{Stopped, Watch};
 use super::select::{LEAST_GAIN, is_physical, price};
-use super::turns::AboutTurns;
 use crate::machine::Cause;
 use std::sync::Arc;
 
@@ -102,9 +101,7 @@ fn in_its_place(bench: &Bench, found: &Fit, set: &Fit, watch: &Watch) -> Result<
             return Ok(None);
         }
     }
-    let turns = AboutTurns::of(bench.frame);
-    let [first, finer @ ..] =
-        STAGES.map(|(seconds, steps, moves)| (bench.smoothed_in(&turns.stretches, seconds), (steps, moves)));
+    let [first, finer @ ..] = STAGES.map(|(seconds, steps, moves)| (bench.smoothed(seconds), (steps, moves)));
     let approached =
         |(sums, moves): &(Bench, _), law, shapes| approached((sums, *moves), &beside, (law, shapes), &resistance);
     let starts = loose_spring::starts(bench.frame, &masses);

@@ -75,33 +75,24 @@ pub fn direction_of(columns: &Columns, v: &[f64], a: &[f64], resolution: f64) ->
 /// How far the direction of friction is open at each row, 0 to 1: at rest, and at a turn as long as the encoder shows no way
 /// back, since the axis may stick there for a moment.
 pub fn doubtful_rows(columns: &Columns, resting: Vec<bool>, resolution: f64) -> Vec<f64> {
+    let x = &columns.position;
     let mut doubt: Vec<f64> = resting.into_iter().map(|r| f64::from(u8::from(r))).collect();
-    for turn in turns(columns, resolution, 0.0) {
-        doubt[turn].fill(1.0);
+    for s in &columns.stretches {
+        for turn in turning_points(&x[s.clone()], TURN * resolution) {
+            let turn = s.start + turn;
+            let near = |i: usize| (x[i] - x[turn]).abs() < 2.5 * resolution;
+            let mut first = turn.saturating_sub(1).max(s.start);
+            while first > s.start && near(first - 1) {
+                first -= 1;
+            }
+            let mut last = (turn + 1).min(s.end - 1);
+            while last + 1 < s.end && near(last + 1) {
+                last += 1;
+            }
+            doubt[first..=last].fill(1.0);
+        }
     }
     doubt
-}
-
-/// The rows of each turn between ways of so much at least, load units: those about it at which the encoder shows no such way.
-pub fn turns(columns: &Columns, resolution: f64, least: f64) -> Vec<Range<usize>> {
-    let x = &columns.position;
-    let rows_of = |s: &Range<usize>, turn: usize| {
-        let near = |i: usize| (x[i] - x[turn]).abs() < least.max(2.5 * resolution);
-        let mut first = turn.saturating_sub(1).max(s.start);
-        while first > s.start && near(first - 1) {
-            first -= 1;
-        }
-        let mut last = (turn + 1).min(s.end - 1);
-        while last + 1 < s.end && near(last + 1) {
-            last += 1;
-        }
-        first..last + 1
-    };
-    let of_stretch = |s: &Range<usize>| {
-        let turns = turning_points(&x[s.clone()], least.max(TURN * resolution)).into_iter();
-        turns.map(|turn| rows_of(s, s.start + turn)).collect::<Vec<_>>()
-    };
-    columns.stretches.iter().flat_map(of_stretch).collect()
 }
 
 /// Share of the stroke that an axis travels before it has forgotten where it stood: which flank the table touched, if any, and which

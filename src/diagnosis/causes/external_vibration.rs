@@ -100,9 +100,7 @@ mod tests {
         let unshaken = Resistance::of(&frame, &behind);
         let shaken = unshaken.clone().shaken_by(&frame, &LAW, &shape, &held);
         let term = |law: &Law, under: &Resistance, shape: Vec<f64>| law.terms(&frame, under, &[shape]).swap_remove(0);
-        let made = |under: &Resistance| {
-            table_side::terms(&frame, &columns.stretches, under, &[Some(spring)]).swap_remove(0).fixed.unwrap()
-        };
+        let made = |under: &Resistance| table_side::terms(&frame, under, &[Some(spring)]).swap_remove(0).fixed.unwrap();
         let ([with, without], waves) = ([&shaken, &unshaken].map(made), term(&LAW, &unshaken, shape).regressors);
         type Channel = fn(&Trace) -> &[f64];
         for channel in [(|t| &t.torque) as Channel, |t| &t.table] {

@@ -29,7 +29,6 @@ pub(super) mod thermal_drift;
 use super::frame::Frame;
 use crate::machine::{Axis, Cause, Effect, TwoMasses};
 use rayon::prelude::*;
-use std::ops::Range;
 pub use table_side::{Resistance, Shaking};
 
 /// A regressor at the judged rows: what one unit of a coefficient adds.
@@ -171,24 +170,12 @@ impl Law {
     /// The traces at given non-linear parameters, one for each set of them.
     #[must_use]
     pub fn terms(&self, frame: &Frame, resistance: &Resistance, shapes: &[Vec<f64>]) -> Vec<Term> {
-        self.terms_in(frame, &frame.columns.stretches, resistance, shapes)
-    }
-
-    /// The same; a table that is simulated is so in some stretches alone.
-    #[must_use]
-    pub fn terms_in(
-        &self,
-        frame: &Frame,
-        stretches: &[Range<usize>],
-        resistance: &Resistance,
-        shapes: &[Vec<f64>],
-    ) -> Vec<Term> {
         match self.terms {
             Terms::ByRows(terms) => terms(frame, shapes),
             Terms::Shaking(terms, _) => terms(frame, resistance.link(), shapes),
             Terms::Simulated(effect) => {
                 let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(frame, shape)).collect();
-                table_side::terms(frame, stretches, resistance, &effects)
+                table_side::terms(frame, resistance, &effects)
             }
         }
     }

@@ -27,25 +27,19 @@ use std::cell::RefCell;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// The traces in the torque (against the rigid axis) and in table − encoder, of each effect: in these stretches, nothing elsewhere.
-pub fn terms(
-    frame: &Frame,
-    stretches: &[Range<usize>],
-    resistance: &Resistance,
-    effects: &[Option<Effect>],
-) -> Vec<Term> {
-    terms_of(frame, stretches, resistance, &effects.iter().map(|effect| split(frame, *effect)).collect::<Vec<_>>())
+/// The traces in the torque (against the rigid axis) and in table − encoder, of each effect.
+pub fn terms(frame: &Frame, resistance: &Resistance, effects: &[Option<Effect>]) -> Vec<Term> {
+    terms_of(frame, resistance, &effects.iter().map(|effect| split(frame, *effect)).collect::<Vec<_>>())
 }
 
 /// The same of one effect under each of these resistances.
 pub fn terms_under_each(frame: &Frame, resistances: &[&Resistance], effect: Option<Effect>) -> Vec<Term> {
     let Some(masses) = split(frame, effect) else { return vec![Term::default(); resistances.len()] };
-    let all = &frame.columns.stretches;
     let together = |some: &[&Resistance]| match some {
-        [one] => Tables::<1, _>::new(frame, Alike(one), &[masses]).terms(all, 1),
+        [one] => Tables::<1, _>::new(frame, Alike(one), &[masses]).terms(1),
         several => {
             let own: [&Resistance; FEW] = std::array::from_fn(|l| several[l.min(several.len() - 1)]);
-            Tables::<FEW, _>::new(frame, Each(own), &[masses]).terms(all, several.len())
+            Tables::<FEW, _>::new(frame, Each(own), &[masses]).terms(several.len())
         }
     };
     resistances.par_chunks(FEW).flat_map_iter(together).collect()
@@ -59,7 +53,7 @@ pub fn split(frame: &Frame, effect: Option<Effect>) -> Option<TwoMasses> {
 /// The trace of what an axis is believed to have between motor and table; `None` where that is nothing.
 pub fn believed(frame: &Frame, axis: &Axis, resistance: &Resistance) -> Option<Trace> {
     let masses = axis.two_masses().ok().flatten()?;
-    terms_of(frame, &frame.columns.stretches, resistance, &[Some(masses)]).swap_remove(0).fixed
+    terms_of(frame, resistance, &[Some(masses)]).swap_remove(0).fixed
 }
 
 /// How a table swings behind a spring, as the law of an elastic drive has it: its own frequency, Hz, the share of the inertia, the
@@ -83,17 +77,12 @@ pub fn open_damping(frame: &Frame, effect: &Effect) -> f64 {
     0.5 * viscous / swing * faster
 }
 
-fn terms_of(
-    frame: &Frame,
-    stretches: &[Range<usize>],
-    resistance: &Resistance,
-    splits: &[Option<TwoMasses>],
-) -> Vec<Term> {
+fn terms_of(frame: &Frame, resistance: &Resistance, splits: &[Option<TwoMasses>]) -> Vec<Term> {
     let sound: Vec<TwoMasses> = splits.iter().copied().flatten().collect();
     let together = |masses: &[TwoMasses]| match masses {
-        [one] => Tables::<1, _>::new(frame, Alike(resistance), std::slice::from_ref(one)).terms(stretches, 1),
-        few if few.len() <= FEW => Tables::<FEW, _>::new(frame, Alike(resistance), few).terms(stretches, few.len()),
-        several => Tables::<LANES, _>::new(frame, Alike(resistance), several).terms(stretches, several.len()),
+        [one] => Tables::<1, _>::new(frame, Alike(resistance), std::slice::from_ref(one)).terms(1),
+        few if few.len() <= FEW => Tables::<FEW, _>::new(frame, Alike(resistance), few).terms(few.len()),
+        several => Tables::<LANES, _>::new(frame, Alike(resistance), several).terms(several.len()),
     };
     // As many in each go, which may go at a time. Few are shared between cores that may have nothing else to do.
     let most = if sound.len() > LANES { LANES } else { FEW };
@@ -255,7 +244,7 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
 
     /// The traces of the first `count` tables: torque beyond that of the rigid axis, each row the mean under a triangle over one
     /// row to either side, and table − motor in load units.
-    fn terms(&self, stretches: &[Range<usize>], count: usize) -> Vec<Term> {
+    fn terms(&self, count: usize) -> Vec<Term> {
         ROOM.with_borrow_mut(|[extra, lag]| {
             let rows = self.frame.x.len();
             let lags = if self.frame.columns.table.is_some() { rows } else { 0 };
@@ -264,7 +253,7 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
             lag.resize(N * lags, 0.0);
             let [extra, lag] = [extra, lag].map(|column| column.as_chunks_mut::<N>().0);
             let sliding = if self.flanks { None } else { Some(self.sliding()) };
-            for s in stretches {
+            for s in &self.frame.columns.stretches {
                 widest(
                     #[inline(always)]
                     || match &sliding {
@@ -273,12 +262,9 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
                     },
                 );
             }
-            let torques = self.frame.low_passed_together(stretches, extra);
-            let tables = if lags > 0 {
-                self.frame.low_passed_together(stretches, lag)
-            } else {
-                std::array::from_fn(|_| Vec::new())
-            };
+            let torques = self.frame.low_passed_together(extra);
+            let tables =
+                if lags > 0 { self.frame.low_passed_together(lag) } else { std::array::from_fn(|_| Vec::new()) };
             let term = |(lane, (mut torque, mut table)): (usize, (Vec<f64>, Vec<f64>))| {
                 if !self.shaken[lane].is_empty() {
                     let Trace { torque: held, table: swinging } = &self.resistance.lane(lane).sliding;

@@ -25,11 +25,11 @@ impl<'f, 'a> Bench<'f, 'a> {
         let mut measured = self.measured.clone();
         clear(&mut measured, &directions);
         let (doubt, certain, windows) = (self.doubt.clone(), self.certain.clone(), self.windows.clone());
-        let (resistance, simulated) = (self.resistance.clone(), self.simulated.clone());
+        let resistance = self.resistance.clone();
         let mut free = self.free.clone();
         free.iter_mut().for_each(|column| clear(column, &directions));
         let free = orthonormalised(free);
-        Beside { bench: Self { measured, doubt, certain, free, resistance, windows, simulated, ..*self }, directions }
+        Beside { bench: Self { measured, doubt, certain, free, resistance, windows, ..*self }, directions }
     }
 }
 
@@ -60,8 +60,8 @@ impl Bench<'_, '_> {
     pub fn beside_lines(&self, columns: &[Vec<f64>]) -> Self {
         let free = orthonormalised(self.free.iter().chain(columns).cloned().collect());
         let (doubt, certain, windows) = (self.doubt.clone(), self.certain.clone(), self.windows.clone());
-        let (resistance, simulated) = (self.resistance.clone(), self.simulated.clone());
-        Self { measured: self.measured.clone(), doubt, certain, free, resistance, windows, simulated, ..*self }
+        let resistance = self.resistance.clone();
+        Self { measured: self.measured.clone(), doubt, certain, free, resistance, windows, ..*self }
     }
 
     /// What these columns together take of the measurement.

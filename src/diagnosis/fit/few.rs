@@ -13,8 +13,8 @@ impl Bench<'_, '_> {
         let (measured, doubt, certain) = (few(&self.measured), few(&self.doubt), few(&self.certain));
         let free = orthonormalised(self.free.iter().map(|column| unit(few(column))).collect());
         let (floors, resistance) = (self.floors, self.resistance.clone());
-        let (rows, simulated) = (frame.kept.len(), frame.columns.stretches.clone());
-        Bench { frame, measured, floors, doubt, certain, rows, free, resistance, windows: Vec::new(), simulated }
+        let rows = frame.kept.len();
+        Bench { frame, measured, floors, doubt, certain, rows, free, resistance, windows: Vec::new() }
     }
 }
 

@@ -18,47 +18,28 @@ impl Bench<'_, '_> {
     /// These equations, the judged rows within this time, s, summed to one, four times in it.
     #[must_use]
     pub fn smoothed(&self, seconds: f64) -> Self {
-        let all = std::iter::once(0..self.frame.kept.len());
-        self.summed_within(all, seconds, self.simulated.clone())
-    }
-
-    /// The same in some stretches alone, in which tables are simulated.
-    #[must_use]
-    pub fn smoothed_in(&self, stretches: &[Range<usize>], seconds: f64) -> Self {
-        let within = stretches.iter().map(|stretch| self.frame.kept_within(stretch));
-        self.summed_within(within, seconds, stretches.to_vec())
-    }
-
-    /// Rows are summed with those of the same piece of the judged rows.
-    fn summed_within(
-        &self,
-        pieces: impl Iterator<Item = Range<usize>>,
-        seconds: f64,
-        simulated: Vec<Range<usize>>,
-    ) -> Self {
         let kept = &self.frame.kept;
         let reach = (0.5 * seconds / self.frame.columns.period_s) as usize;
+        let (mut first, mut end) = (0, 0);
         let mut windows: Vec<Range<usize>> = Vec::new();
-        for piece in pieces {
-            let (mut first, mut end, mut next) = (piece.start, piece.start, 0);
-            for &row in &kept[piece.clone()] {
-                while kept[first] + reach < row {
-                    first += 1;
-                }
-                while end < piece.end && kept[end] <= row + reach {
-                    end += 1;
-                }
-                if row >= next {
-                    windows.push(first..end);
-                    next = row + (reach / 2).max(1);
-                }
+        let mut next = 0;
+        for &row in kept {
+            while kept[first] + reach < row {
+                first += 1;
+            }
+            while end < kept.len() && kept[end] <= row + reach {
+                end += 1;
+            }
+            if row >= next {
+                windows.push(first..end);
+                next = row + (reach / 2).max(1);
             }
         }
         let sum = |column: &[f64]| summed(column.to_vec(), kept.len(), &windows);
         let (measured, doubt) = (sum(&self.measured), sum(&self.doubt));
         let free = orthonormalised(self.free.iter().map(|column| unit(sum(column))).collect());
         let (certain, resistance) = (self.certain.clone(), self.resistance.clone());
-        Self { measured, doubt, certain, free, resistance, rows: windows.len(), windows, simulated, ..*self }
+        Self { measured, doubt, certain, free, resistance, rows: windows.len(), windows, ..*self }
     }
 
     /// Whether several rows are summed to one.

@@ -192,7 +192,6 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
 mod tests {
     use super::*;
     use crate::diagnosis::frame::Columns;
-    use crate::diagnosis::turns::AboutTurns;
     use crate::machine::Machine;
     use crate::plant::noise::Noise;
 
@@ -207,47 +206,21 @@ mod tests {
         Columns { position_grid: grid, ..Columns::every_millisecond(position, torque) }
     }
 
-    fn clearance() -> Option<Effect> {
-        Some(Effect::Backlash {
+    #[test]
+    fn flanks_that_rest_on_each_other_are_not_parted_by_the_steps_of_the_encoder() {
+        let axis = Machine::parse(include_str!("../../../../examples/machines/believed.json")).unwrap().axes.remove(0);
+        let clearance = Effect::Backlash {
             width_um: 30.0,
             table_inertia_share: 0.5,
             table_friction_share: 0.5,
             contact_hz: 700.0,
             contact_damping_ratio: 0.3,
-        })
-    }
-
-    #[test]
-    fn about_turns_flanks_meet_as_they_do_where_all_rows_are_simulated() {
-        let axis = Machine::parse(include_str!("../../../../examples/machines/believed.json")).unwrap().axes.remove(0);
-        let columns = there_and_back(1e-4);
-        let frame = Frame::new(&axis, &columns, Some(5));
-        let resistance = Resistance::of(&frame, &axis);
-        let about = AboutTurns::of(&frame).stretches;
-        let [some, all] = [&about, &columns.stretches].map(|stretches| {
-            terms(&frame, stretches, &resistance, &[clearance()]).swap_remove(0).fixed.unwrap().torque
-        });
-        let largest = all.iter().fold(0.0, |most: f64, torque| most.max(torque.abs()));
-        let (mut within, mut apart) = (0, 0.0f64);
-        for stretch in &about {
-            for k in frame.kept_within(stretch) {
-                (within, apart) = (within + 1, apart.max((some[k] - all[k]).abs()));
-            }
-        }
-        // Where a stretch begins the encoder's grid may part flanks for some rows.
-        assert!(largest > 0.3 && apart < 0.02 * largest, "{apart} of {largest}");
-        let nothing = some.iter().filter(|torque| **torque == 0.0).count();
-        assert!(within < 3 * some.len() / 4 && nothing >= some.len() - within, "{within} {nothing} of {}", some.len());
-    }
-
-    #[test]
-    fn flanks_that_rest_on_each_other_are_not_parted_by_the_steps_of_the_encoder() {
-        let axis = Machine::parse(include_str!("../../../../examples/machines/believed.json")).unwrap().axes.remove(0);
+        };
         for grid in [1e-3, 1e-6] {
             let columns = there_and_back(grid);
             let frame = Frame::new(&axis, &columns, Some(5));
             let resistance = Resistance::of(&frame, &axis);
-            let trace = terms(&frame, &columns.stretches, &resistance, &[clearance()]).swap_remove(0).fixed.unwrap();
+            let trace = terms(&frame, &resistance, &[Some(clearance)]).swap_remove(0).fixed.unwrap();
             let (mut crossing, mut together) = (0.0f64, 0.0f64);
             for (row, torque) in frame.kept.iter().zip(&trace.torque) {
                 // At 0.7 mm/s the clearance is crossed in 44 ms.
