@@ -42,7 +42,8 @@ static void every_law_holds_in_known_runs(void **state)
     adversary_tally t = judged(test->known_seed, test->known_runs);
     assert_true(t.met >= test->least_met * test->known_runs && t.ended >= test->least_ended * test->known_runs);
     assert_true(t.clean >= test->least_clean * test->known_runs);
-    if (test->right) {
+    /* Of fewer runs chance alone would lead beyond these shares. */
+    if (test->right && ONE_IN == 1) {
         assert_true(100 * t.held >= test->held_from * t.values && 100 * t.held <= test->held_to * t.values);
         assert_true(100 * t.clean_refused <= test->most_refused * t.clean);
     }
