@@ -112,8 +112,8 @@ fn an_axis_within_its_friction_stands_still_to_the_last_bit() {
     }
 }
 
-/// Flanks that swing at 1500 Hz take steps of 7 µs, and while they are calm 25 µs do: what differs from steps of 5 µs all the time is
-/// that they meet a part of a step sooner or later.
+/// Flanks that swing at 1500 Hz take steps of 7 µs, and while they are calm 25 µs do, beside friction that builds up as well: what differs
+/// from steps of 5 µs all the time is that they meet a part of a step sooner or later.
 #[test]
 fn calm_flanks_do_as_well_in_longer_steps() {
     let backlash = Effect::Backlash {
@@ -123,13 +123,21 @@ fn calm_flanks_do_as_well_in_longer_steps() {
         contact_hz: 1500.0,
         contact_damping_ratio: 0.3,
     };
-    for moves in ["reversals", "test"] {
+    let building_up = |exponent, maxwell_slip| Effect::PreslidingFriction {
+        displacement_um: 12.0,
+        exponent,
+        maxwell_slip,
+        micro_damping_s: 0.0,
+    };
+    let beside = [[backlash, building_up(0.7, 0.0)], [backlash, building_up(0.5, 1.0)]];
+    let cases = [("reversals", &[backlash][..]), ("test", &[backlash]), ("test", &beside[0]), ("test", &beside[1])];
+    for (moves, effects) in cases {
         let [long, short] =
-            [25e-6, 5e-6].map(|step_s| run(&rig(&[backlash]), moves, &Setup { step_s, ..Setup::default() }));
+            [25e-6, 5e-6].map(|step_s| run(&rig(effects), moves, &Setup { step_s, ..Setup::default() }));
         let apart = |a: &[f64], b: &[f64]| rms(a.iter().zip(b).map(|(a, b)| a - b));
         let motor = apart(&long.position, &short.position);
         let table = apart(&long.table_position, &short.table_position);
-        assert!(motor < 15e-6 && table < 20e-6, "{motor} and {table} mm in {moves}");
+        assert!(motor < 15e-6 && table < 30e-6, "{motor} and {table} mm in {moves} of {effects:?}");
     }
 }
 

@@ -135,9 +135,10 @@ impl Body {
                 (mass(masses.motor_inertia, 1.0 - share), table)
             }
         };
-        // Friction that builds up over a way has a swing of its own.
-        let flanks = physics.two_masses.filter(|masses| masses.clearance > 0.0 && physics.presliding.is_none());
+        let flanks = physics.two_masses.filter(|masses| masses.clearance > 0.0);
         let lightest = |masses: &TwoMasses| masses.motor_inertia.min(masses.table_inertia);
+        // Friction that builds up over a way has a swing of its own.
+        let longest_s = longest_s.min(physics.longest_bristle_step_s(&[&motor, &table].map(|m| (m.inertia, m.share))));
         let calm_step_s = flanks.map(|masses| longest_s.min(LONGER * longest_step_s(&masses, lightest(&masses))));
         let plain = physics.is_plain();
         let load_per_motor = 1.0 / physics.motor_per_load;
@@ -156,12 +157,13 @@ impl Body {
         let span = steps as f64 * self.pace.step_s;
         let few = (span / calm_step_s).ceil() as usize;
         if self.calm && few < steps {
-            let before = self.state;
+            let (before, elements) = (self.state, [0, 1].map(|of| self.held[of].elements));
             self.step::<true>(asked, few, Pace::new(span / few as f64, self.time_constant_s));
             if self.calm {
                 return;
             }
             self.state = before;
+            self.held.iter_mut().zip(elements).for_each(|(held, before)| held.elements = before);
         }
         self.step::<true>(asked, steps, self.pace);
     }

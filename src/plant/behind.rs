@@ -69,18 +69,18 @@ impl<'o> Table<'o> {
         let shortest = longest_step_s(&masses, masses.table_inertia);
         let steps = |step_s: f64| (span / step_s).ceil().clamp(1.0, 1000.0) as usize;
         let is_calm = |leaning: &Leaning| leaning.is_calm(&masses, masses.table_inertia);
-        // What builds up over a way has its own swing.
-        let flanks_alone = masses.clearance > 0.0 && self.physics.presliding.is_none();
         if self.goes_along {
             let before = self.now;
-            let leaning = self.step_to_next(row, span, steps(LONGER * shortest));
+            // What builds up over a way has its own swing.
+            let longest = self.physics.longest_bristle_step_s(&[(masses.table_inertia, masses.table_friction_share)]);
+            let leaning = self.step_to_next(row, span, steps(longest.min(LONGER * shortest)));
             if is_calm(&leaning) {
                 return leaning.mean();
             }
             self.now = before;
         }
         let leaning = self.step_to_next(row, span, steps(shortest));
-        self.goes_along = flanks_alone && is_calm(&leaning);
+        self.goes_along = masses.clearance > 0.0 && is_calm(&leaning);
         leaning.mean()
     }
 

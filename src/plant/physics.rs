@@ -13,6 +13,9 @@ use std::f64::consts::TAU;
 /// Least share of the current beyond a motor's limit that must be delivered for the current to be told from the torque.
 pub const LEAST_SLOPE: f64 = 0.02;
 
+/// Radians of a swing on bristles to a step, which damps it by half as much.
+const BRISTLE_RAD: f64 = 1.0 / 15.0;
+
 /// A sine in position or time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ripple {
@@ -270,6 +273,14 @@ impl Physics {
     #[must_use]
     pub fn bristle(&self, share: f64) -> Friction {
         Friction::new(share * self.bristle_stiffness().unwrap_or(0.0), self.bristle_law)
+    }
+
+    /// Longest step in which a bristle follows its swing under bodies of these inertias and shares of the friction, s; infinite without one.
+    #[must_use]
+    pub fn longest_bristle_step_s(&self, bodies: &[(f64, f64)]) -> f64 {
+        let stiffness = self.bristle_stiffness().unwrap_or(0.0);
+        let square = bodies.iter().map(|(inertia, share)| share * stiffness / inertia).fold(0.0, f64::max);
+        BRISTLE_RAD / square.sqrt().max(square * self.bristle_law.micro_damping_s)
     }
 
     /// Friction that grows with speed; `w` in the motor's coordinate.
