@@ -97,7 +97,8 @@ fn in_its_place(bench: &Bench, found: &Fit, set: &Fit, watch: &Watch) -> Result<
     if let Some(little) = little {
         let starts = bench.parts_under(&loose_spring::LAW, little, &resistance).into_iter().map(with);
         let Some(start) = starts.min_by(|a, b| a.squares().total_cmp(&b.squares())) else { return Ok(None) };
-        if bench.refine_roughly(start, others.len(), STEPS[1]).squares() > LESS * set.squares() {
+        let enough = LESS * set.squares();
+        if bench.refine_towards(start, others.len(), STEPS[1], enough).squares() > enough {
             return Ok(None);
         }
     }
