@@ -6,7 +6,7 @@
 //! T(t + h) = u + (T − u)·e^(−h/τ), and a step feels its mean. Steps are as short as flanks need that swing; while they are
 //! calm, they are as long as all else needs.
 
-use super::coupling::{LONGER, Leaning, longest_step_s, transmitted};
+use super::coupling::{CALM, LONGER, Leaning, longest_step_s, transmitted};
 use super::friction::{Bristle, Elements, Friction};
 use super::nearby::Nearby;
 use super::physics::Physics;
@@ -192,7 +192,7 @@ impl Body {
         self.state = state;
         if let Some(masses) = self.laws.physics.two_masses.filter(|_| FLANKS && steps > 0) {
             let both = masses.motor_inertia + masses.table_inertia;
-            self.calm = leaning.is_calm(&masses, masses.motor_inertia * masses.table_inertia / both);
+            self.calm = leaning.is_calm(CALM, &masses, masses.motor_inertia * masses.table_inertia / both);
         }
     }
 

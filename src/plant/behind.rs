@@ -1,6 +1,6 @@
 //! The table behind a motor that moves as measured: simulated behind its spring or clearance.
 
-use super::coupling::{Giving, LONGER, Leaning, longest_step_s, transmitted};
+use super::coupling::{CALM_BEHIND_MEASURED, Giving, LONGER, Leaning, longest_step_s, transmitted};
 use super::friction::Friction;
 use super::nearby::Nearby;
 use super::observed::Observed;
@@ -68,7 +68,7 @@ impl<'o> Table<'o> {
         let masses = self.masses;
         let shortest = longest_step_s(&masses, masses.table_inertia);
         let steps = |step_s: f64| (span / step_s).ceil().clamp(1.0, 1000.0) as usize;
-        let is_calm = |leaning: &Leaning| leaning.is_calm(&masses, masses.table_inertia);
+        let is_calm = |leaning: &Leaning| leaning.is_calm(CALM_BEHIND_MEASURED, &masses, masses.table_inertia);
         if self.goes_along {
             let before = self.now;
             // What builds up over a way has its own swing.
@@ -160,8 +160,9 @@ mod tests {
         let mut command = Moves::built_in("test", &reach).unwrap().command(1e-3);
         command.truncate(15_000);
         let trace = simulate(&axis, &command, &Setup::default()).unwrap();
-        let columns =
-            vec![Column::new("x.position_mm", trace.position), Column::new("x.torque_nm", trace.torque.clone())];
+        // An encoder of a quarter of a micrometre, which trembles.
+        let position = trace.position.iter().map(|x| (4e3 * x).round() / 4e3).collect();
+        let columns = vec![Column::new("x.position_mm", position), Column::new("x.torque_nm", trace.torque.clone())];
         let recording = Recording::from_columns("simulated", trace.time_s, columns).unwrap();
         let observed = Observed::of(&recording, &axis).unwrap();
         let (physics, masses) = (Physics::of(&axis).unwrap(), axis.two_masses().unwrap().unwrap());

@@ -61,7 +61,9 @@ impl Giving {
 /// How many times longer the steps may be in which flanks are calm: 0.4 radians of the swing that there is none of.
 pub const LONGER: f64 = 6.0;
 /// Force of a swing of flanks over what they carry up to which they are calm.
-const CALM: f64 = 0.02;
+pub const CALM: f64 = 0.02;
+/// The same behind a motor that moves as measured: they follow what that trembles by as well, which longer steps make no worse.
+pub const CALM_BEHIND_MEASURED: f64 = 0.1;
 
 /// What some steps have shown of flanks. They swing fast, but hardly ever: a table that leans on one of them, slides one way and swings
 /// no more goes with its motor, and is as exact in far longer steps. Steps in which that ends are made once more, short.
@@ -102,12 +104,12 @@ impl Leaning {
         self.sum / self.steps
     }
 
-    /// Whether they were calm; `inertia` is what swings on them.
+    /// Whether they were calm, by the largest share of what they carry that a swing may have; `inertia` is what swings on them.
     #[must_use]
-    pub fn is_calm(&self, masses: &TwoMasses, inertia: f64) -> bool {
+    pub fn is_calm(&self, most: f64, masses: &TwoMasses, inertia: f64) -> bool {
         let swing = (masses.stiffness * inertia).sqrt() * self.apart;
         let mean = self.mean();
-        self.alike && (mean == 0.0 || swing <= CALM * mean.abs())
+        self.alike && (mean == 0.0 || swing <= most * mean.abs())
     }
 }
 
@@ -137,7 +139,7 @@ mod tests {
         let after = |steps: &[(f64, f64, [f64; 2])]| {
             let mut leaning = Leaning::default();
             steps.iter().for_each(|&(torque, rate, speeds)| leaning.add(torque, rate, speeds));
-            leaning.is_calm(&MASSES, 1.0)
+            leaning.is_calm(CALM, &MASSES, 1.0)
         };
         // A swing of 0.001 is a force of 0.01.
         assert!(after(&[(1.0, 0.001, [2.0, 2.0]), (1.1, -0.001, [2.0, 2.1])]));

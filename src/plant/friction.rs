@@ -199,13 +199,13 @@ impl Curve {
 
     #[inline(always)]
     fn rate(&mut self, left: f64) -> f64 {
-        let [at, rate] = self.known;
-        let (d, m) = ((left - at) / at, self.exponent - 1.0);
+        let [per_share, rate] = self.known;
+        let (d, m) = (left * per_share - 1.0, self.exponent - 1.0);
         if d.abs() < CLOSE {
             let term = |k: usize| d * PER[k] * (m + 1.0 - k as f64);
             return rate * (1.0 + term(1) * (1.0 + term(2) * (1.0 + term(3) * (1.0 + term(4) * (1.0 + term(5))))));
         }
-        self.known = [left, self.whole * left.powf(m)];
+        self.known = [1.0 / left, self.whole * left.powf(m)];
         self.known[1]
     }
 
@@ -229,13 +229,15 @@ impl Curve {
         let Strained { stiffness, micro_damping_s, force } = strained;
         let free = impulse - h * force;
         let end = level.copysign(free);
-        let left = (0.5 - 0.5 * force / end).min(1.0);
+        // The level does not wait for the force, as a quotient of both would.
+        let per_level = 1.0 / level;
+        let left = (0.5 - 0.5 * force * per_level.copysign(free)).min(1.0);
         if left < NOTHING {
             return (self, end, free / mass);
         }
         let rate = self.rate(left);
         let next = free / (mass + h * (h + micro_damping_s) * stiffness * 2.0 * left * rate);
-        let left = self.after(left, stiffness * (h * next).abs() / level * rate);
+        let left = self.after(left, stiffness * (h * next).abs() * per_level * rate);
         (self, end * (1.0 - 2.0 * left), next)
     }
 }
