@@ -148,6 +148,7 @@ fn a_vibration_in_a_narrow_band_is_named_and_noise_of_any_colour_is_none() {
         let [finding] = found.findings.as_slice() else { panic!("{:?} {:?}", found.verdict, found.findings) };
         let Effect::ExternalVibration { frequency_hz, .. } = finding.effect else { panic!("{finding:?}") };
         assert!((frequency_hz - hz).abs() < 2.5 * finding.deviations[0] && finding.deviations[0] < 0.1, "{finding:?}");
+        assert!(finding.confidence > 0.95, "{finding:?}");
         assert!(found.extended == axis() && found.notes.len() == 1, "{:?}", found.notes);
     }
     // Wide: a fortieth of a second.

@@ -306,7 +306,7 @@ fn answer_on(
     notes.extend(nameless(frame, &fit));
     if let Some(band) = vibration {
         verdict = band.beside(bench, verdict, &fit);
-        notes.push(join(band, &mut findings, axis, &fit));
+        notes.push(join(band, bench, &mut findings, axis, &fit));
     }
     let shown = show::views(bench, vibration.map_or(&empty, |band| &band.before), &fit);
     let unexplained = unexplained(bench, &fit, &shown, whole.columns.table.is_some());
@@ -325,14 +325,14 @@ fn answer_on(
 }
 
 /// Puts a vibration among what was found beside it, largest share first, and says what a machine file cannot have of it.
-fn join(band: &Band, findings: &mut Vec<Finding>, axis: &Axis, fit: &Fit) -> String {
+fn join(band: &Band, bench: &Bench, findings: &mut Vec<Finding>, axis: &Axis, fit: &Fit) -> String {
     let all = band.before.squares();
     let rest = band.after.squares() / all;
     findings.iter_mut().for_each(|finding| finding.share *= rest);
     findings.push(Finding {
         effect: band.effect,
         deviations: band.deviations.clone(),
-        confidence: 0.9999,
+        confidence: confidence(block_t(bench, &band.before, &band.after)),
         share: (1.0 - fit.squares() / all - findings.iter().map(|f| f.share).sum::<f64>()).clamp(0.0, 1.0),
         evidence: (law(Cause::ExternalVibration).sentence)(&band.effect, axis),
         indistinguishable_from: Vec::new(),
