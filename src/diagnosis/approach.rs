@@ -39,6 +39,8 @@ impl<'f, 'a> Approach<'f, 'a> {
     pub fn from(&self, starts: &[Part], set: &Fit) -> Option<Vec<f64>> {
         let ((first, stride), finer) = self.stages.split_first()?;
         let there = first.again(set);
+        let leaned = first.leaned(starts, set);
+        let starts = leaned.as_deref().unwrap_or(starts);
         let left = |part: &Part| first.left_beside(&there, part);
         let squares = |part: &Part| {
             let left = left(part);

@@ -8,6 +8,7 @@ mod board;
 mod by_loop;
 mod coarse_encoder;
 mod generated;
+mod leaning;
 mod predicted;
 mod quiet;
 mod worm;

@@ -131,6 +131,14 @@ impl Bench<'_, '_> {
         Arc::new(shaking.into_iter().fold(resistance, shaken))
     }
 
+    /// Starts of a clearance under the load of a set where that leans the table on another flank; `None` where they do as they are.
+    #[must_use]
+    pub fn leaned(&self, starts: &[Part], set: &Fit) -> Option<Vec<Part>> {
+        let (start, resistance) = (starts.first()?, self.resistance_of(set));
+        let shapes = || starts.iter().map(|part| part.shape.clone()).collect();
+        start.resistance.leans_otherwise(&resistance).then(|| self.parts_under(start.law, shapes(), &resistance))
+    }
+
     /// A fit whose table, where one is simulated, moves under what its other causes make of friction and load, and is shaken behind it.
     #[must_use]
     pub fn at_one(&self, fit: Fit) -> Fit {

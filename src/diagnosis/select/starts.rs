@@ -78,7 +78,8 @@ pub fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law, much
     let shelved = || search.shelved(law);
     let fresh: Vec<Part>;
     let parts: &[Part] = if law.manner.approached {
-        fresh = bench.parts(law, approach.from(shelved(), set).into_iter().collect());
+        let there = bench.parts(law, approach.from(shelved(), set).into_iter().collect());
+        fresh = bench.leaned(&there, set).unwrap_or(there);
         &fresh
     } else if law.manner.starts_from_rest {
         fresh = bench.parts(law, bench.starts(law, set));

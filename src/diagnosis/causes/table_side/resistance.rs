@@ -13,6 +13,10 @@ use crate::plant::physics::Physics;
 /// Change of dry friction and load, as a share of both (root mean square), that leaves a simulated table where it is.
 const ALIKE: f64 = 3e-4;
 
+/// Change of the load, as a share of the dry friction of all of the axis (root mean square), from which on it may lean a table on another
+/// flank: tables carry a quarter of that friction and more.
+const LEANS: f64 = 0.25;
+
 /// Friction and load of an axis along a recording, drive's own unit; the table has its share of the friction and all of the load.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Resistance {
@@ -156,6 +160,13 @@ impl Resistance {
             viscous: 0.5 * (forward + backward),
             bristle,
         }
+    }
+
+    /// Whether the load may lean a table on another flank than that of another does: flanks that friction parts at each turn a larger load
+    /// keeps together.
+    #[must_use]
+    pub fn leans_otherwise(&self, other: &Self) -> bool {
+        apart(&self.load, &other.load) > LEANS * LEANS * dot(&self.level, &self.level)
     }
 
     /// Whether a table moves under this as under another.

@@ -1,0 +1,23 @@
+//! A load beyond the friction of the table keeps flanks together where the axis turns, and they part where it brakes: as long as nobody
+//! knows of the load a clearance seems to be crossed at each turn.
+
+use crate::board::rig::Scale;
+use crate::generated::{Rig, rig, said, set_apart};
+
+#[test]
+fn a_clearance_is_found_together_with_the_load_that_leans_on_it() {
+    let scale = Scale { step: 1e-3, noise: 2e-4, zero: 0.1 };
+    for (seed, load, table) in [(1, 0.7, None), (2, -0.8, Some(scale))] {
+        let rig = Rig { table, ..rig() };
+        let (verdict, findings) = said([&rig, &rig], seed, |truth| {
+            truth.constant += load;
+            set_apart(truth, 0.05, 700.0, [0.47, 0.4], 0.3);
+        });
+        println!("seed {seed}: {verdict} {findings:?}");
+        let value = |cause: &str| findings.iter().find(|(found, _)| found == cause).map(|(_, value)| *value);
+        let (Some(um), Some(nm), 2) = (value("backlash"), value("constant_torque"), findings.len()) else {
+            panic!("seed {seed}: {verdict} {findings:?}")
+        };
+        assert!((um / 50.0 - 1.0).abs() < 0.2 && (nm / load - 1.0).abs() < 0.05, "seed {seed}: {um} µm, {nm} N·m");
+    }
+}
