@@ -67,8 +67,9 @@ check-lints:
 rust-tests: check-lints
 	$(CARGO) test --no-run
 
+# Cargo does not take part in the jobs of make, and rustdoc would warn of them.
 test-rust:
-	GIB_RELEASE=$(RELEASE) $(CARGO) test
+	GIB_RELEASE=$(RELEASE) MAKEFLAGS= $(CARGO) test
 
 test-parquet: ## the feature parquet, which takes minutes to build and is not in `make test`
 	$(CARGO) test --features parquet --lib -- parquet
