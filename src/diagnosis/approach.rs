@@ -48,8 +48,9 @@ impl<'f, 'a> Approach<'f, 'a> {
         };
         let rated = starts.par_iter().map(|part| (squares(part), part));
         let (_, nearest) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        // Starts lie so close that one of them takes off much of what a clearance makes.
-        if figure(&first.channels(&left(nearest))) > there.figure() - LEAST {
+        // Starts lie so close that one of them takes off much of what a clearance makes; but where a load leans on it, how long flanks are
+        // apart goes with the shares as well, and a start may be worse than none in a fine scale.
+        if leaned.is_none() && figure(&first.channels(&left(nearest))) > there.figure() - LEAST {
             return None;
         }
         let start = first.parts_under(nearest.law, vec![nearest.shape.clone()], &first.resistance_of(set)).pop()?;
