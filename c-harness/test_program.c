@@ -44,8 +44,10 @@ static void assert_file(const char *path, const char *expected)
 static int set_up(void **state)
 {
     fixture *f = calloc(1, sizeof *f);
+    if (f == NULL)
+        return -1;
     strcpy(f->folder, "/tmp/gib-program-XXXXXX");
-    if (f == NULL || mkdtemp(f->folder) == NULL || gib_program_size() > sizeof f->memory)
+    if (mkdtemp(f->folder) == NULL || gib_program_size() > sizeof f->memory)
         return -1;
     snprintf(f->path, sizeof f->path, "%s/shaft.nc", f->folder);
     write_file(f->path, PROGRAM, strlen(PROGRAM));

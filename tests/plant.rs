@@ -130,14 +130,19 @@ fn calm_flanks_do_as_well_in_longer_steps() {
         micro_damping_s: 0.0,
     };
     let beside = [[backlash, building_up(0.7, 0.0)], [backlash, building_up(0.5, 1.0)]];
-    let cases = [("reversals", &[backlash][..]), ("test", &[backlash]), ("test", &beside[0]), ("test", &beside[1])];
-    for (moves, effects) in cases {
+    let cases = [
+        ("reversals", &[backlash][..], 20e-6),
+        ("test", &[backlash], 20e-6),
+        ("test", &beside[0], 30e-6),
+        ("test", &beside[1], 30e-6),
+    ];
+    for (moves, effects, most) in cases {
         let [long, short] =
             [25e-6, 5e-6].map(|step_s| run(&rig(effects), moves, &Setup { step_s, ..Setup::default() }));
         let apart = |a: &[f64], b: &[f64]| rms(a.iter().zip(b).map(|(a, b)| a - b));
         let motor = apart(&long.position, &short.position);
         let table = apart(&long.table_position, &short.table_position);
-        assert!(motor < 15e-6 && table < 30e-6, "{motor} and {table} mm in {moves} of {effects:?}");
+        assert!(motor < 15e-6 && table < most, "{motor} and {table} mm in {moves} of {effects:?}");
     }
 }
 

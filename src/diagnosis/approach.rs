@@ -39,7 +39,8 @@ impl<'f, 'a> Approach<'f, 'a> {
     pub fn from(&self, starts: &[Part], set: &Fit) -> Option<Vec<f64>> {
         let ((first, stride), finer) = self.stages.split_first()?;
         let there = first.again(set);
-        let leaned = first.leaned(starts, set);
+        let resistance = first.resistance_of(set);
+        let leaned = first.leaned(starts, &resistance);
         let starts = leaned.as_deref().unwrap_or(starts);
         let left = |part: &Part| first.left_beside(&there, part);
         let squares = |part: &Part| {
@@ -53,7 +54,7 @@ impl<'f, 'a> Approach<'f, 'a> {
         if leaned.is_none() && figure(&first.channels(&left(nearest))) > there.figure() - LEAST {
             return None;
         }
-        let start = first.parts_under(nearest.law, vec![nearest.shape.clone()], &first.resistance_of(set)).pop()?;
+        let start = first.parts_under(nearest.law, vec![nearest.shape.clone()], &resistance).pop()?;
         let mut part = first.approached(&there, start, *stride, MOVES);
         let shows = |bench: &Bench, set: &Fit, part: &Part| {
             figure(&bench.channels(&bench.left_beside(set, part))) < set.figure() - LEAST

@@ -6,7 +6,7 @@
 //! T(t + h) = u + (T − u)·e^(−h/τ), and a step feels its mean. Steps are as short as flanks need that swing; while they are
 //! calm, they are as long as all else needs.
 
-use super::coupling::{CALM, LONGER, Leaning, longest_step_s, transmitted};
+use super::coupling::{CALM, Leaning, transmitted};
 use super::friction::{Bristle, Elements, Friction};
 use super::nearby::Nearby;
 use super::physics::Physics;
@@ -136,10 +136,8 @@ impl Body {
             }
         };
         let flanks = physics.two_masses.filter(|masses| masses.clearance > 0.0);
-        let lightest = |masses: &TwoMasses| masses.motor_inertia.min(masses.table_inertia);
-        // Friction that builds up over a way has a swing of its own.
-        let longest_s = longest_s.min(physics.longest_bristle_step_s(&[&motor, &table].map(|m| (m.inertia, m.share))));
-        let calm_step_s = flanks.map(|masses| longest_s.min(LONGER * longest_step_s(&masses, lightest(&masses))));
+        let bodies = [&motor, &table].map(|mass| (mass.inertia, mass.share));
+        let calm_step_s = flanks.map(|masses| longest_s.min(physics.longest_calm_step_s(&masses, &bodies)));
         let plain = physics.is_plain();
         let load_per_motor = 1.0 / physics.motor_per_load;
         let viscous = physics.slope_at(1.0);

@@ -6,6 +6,7 @@
 //! (J, ω, torques) are in the drive's own unit, x and v in load units (mm, mm/s; degrees on a rotary axis), t in s from
 //! the recording's first row.
 
+use super::coupling::{LONGER, longest_step_s};
 use super::friction::{BristleLaw, Friction};
 use crate::machine::{Axis, Effect, TwoMasses};
 use std::f64::consts::TAU;
@@ -14,7 +15,7 @@ use std::f64::consts::TAU;
 pub const LEAST_SLOPE: f64 = 0.02;
 
 /// Radians of a swing on bristles to a step, which damps it by half as much.
-const BRISTLE_RAD: f64 = 1.0 / 15.0;
+const BRISTLE_RAD: f64 = 1.0 / 120.0;
 
 /// A sine in position or time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -275,12 +276,15 @@ impl Physics {
         Friction::new(share * self.bristle_stiffness().unwrap_or(0.0), self.bristle_law)
     }
 
-    /// Longest step in which a bristle follows its swing under bodies of these inertias and shares of the friction, s; infinite without one.
+    /// Longest step of bodies of these inertias and shares of the friction while the flanks between them are calm, s: friction that builds up
+    /// over a way has a swing of its own.
     #[must_use]
-    pub fn longest_bristle_step_s(&self, bodies: &[(f64, f64)]) -> f64 {
+    pub fn longest_calm_step_s(&self, masses: &TwoMasses, bodies: &[(f64, f64)]) -> f64 {
+        let lightest = bodies.iter().map(|(inertia, _)| *inertia).fold(f64::MAX, f64::min);
         let stiffness = self.bristle_stiffness().unwrap_or(0.0);
         let square = bodies.iter().map(|(inertia, share)| share * stiffness / inertia).fold(0.0, f64::max);
-        BRISTLE_RAD / square.sqrt().max(square * self.bristle_law.micro_damping_s)
+        let bristles = BRISTLE_RAD / square.sqrt().max(square * self.bristle_law.micro_damping_s);
+        bristles.min(LONGER * longest_step_s(masses, lightest))
     }
 
     /// Friction that grows with speed; `w` in the motor's coordinate.

@@ -131,12 +131,12 @@ impl Bench<'_, '_> {
         Arc::new(shaking.into_iter().fold(resistance, shaken))
     }
 
-    /// Starts of a clearance under the load of a set where that leans the table on another flank; `None` where they do as they are.
+    /// Starts of a clearance under this, where its load leans the table on another flank; `None` where they do as they are.
     #[must_use]
-    pub fn leaned(&self, starts: &[Part], set: &Fit) -> Option<Vec<Part>> {
-        let (start, resistance) = (starts.first()?, self.resistance_of(set));
-        let shapes = || starts.iter().map(|part| part.shape.clone()).collect();
-        start.resistance.leans_otherwise(&resistance).then(|| self.parts_under(start.law, shapes(), &resistance))
+    pub fn leaned(&self, starts: &[Part], resistance: &Arc<Resistance>) -> Option<Vec<Part>> {
+        let start = starts.first().filter(|start| start.resistance.leans_otherwise(resistance))?;
+        let shapes = starts.iter().map(|part| part.shape.clone()).collect();
+        Some(self.parts_under(start.law, shapes, resistance))
     }
 
     /// A fit whose table, where one is simulated, moves under what its other causes make of friction and load, and is shaken behind it.

@@ -78,8 +78,10 @@ pub fn at_best_starts<'s>(search: &Search, set: &'s Fit, law: &'static Law, much
     let shelved = || search.shelved(law);
     let fresh: Vec<Part>;
     let parts: &[Part] = if law.manner.approached {
-        let there = bench.parts(law, approach.from(shelved(), set).into_iter().collect());
-        fresh = bench.leaned(&there, set).unwrap_or(there);
+        fresh = approach.from(shelved(), set).map_or_else(Vec::new, |shape| {
+            let there = bench.parts(law, vec![shape]);
+            bench.leaned(&there, &bench.resistance_of(set)).unwrap_or(there)
+        });
         &fresh
     } else if law.manner.starts_from_rest {
         fresh = bench.parts(law, bench.starts(law, set));
