@@ -51,7 +51,7 @@ impl<'f, 'a> Approach<'f, 'a> {
         let (_, nearest) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
         // Starts lie so close that one of them takes off much of what a clearance makes; but where a load leans on it, how long flanks are
         // apart goes with the shares as well, and a start may be worse than none in a fine scale.
-        if leaned.is_none() && figure(&first.channels(&left(nearest))) > there.figure() - LEAST {
+        if !resistance.leans() && figure(&first.channels(&left(nearest))) > there.figure() - LEAST {
             return None;
         }
         let start = first.parts_under(nearest.law, vec![nearest.shape.clone()], &resistance).pop()?;

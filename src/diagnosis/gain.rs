@@ -13,7 +13,8 @@ use crate::plant::added::ByServo;
 use crate::plant::closed_loop::{Manner, predict_by};
 use crate::plant::motion::FEWEST_ROWS;
 use crate::plant::observed::Observed;
-use crate::plant::predict::{TorquePrediction, predict_torque};
+use crate::plant::predict::{TorquePrediction, predict_table, predict_torque};
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// RMS before and after, on rows that were not fitted.
@@ -32,8 +33,8 @@ pub struct Gain {
 /// Errors of one machine on a recording.
 #[derive(Debug, Clone)]
 pub struct Errors {
-    /// Torque, closed-loop position, table position; NaN where not predicted, and for the torque where the axis stands, since
-    /// friction then is not a function of the motion.
+    /// Torque, closed-loop position, table position (without a closed loop that behind the measured motor); NaN where not predicted, and
+    /// for the torque where the axis stands, since friction then is not a function of the motion.
     channels: [Option<Vec<f64>>; 3],
     /// How the loop was replayed, where it was.
     pub replay: Option<Replay>,
@@ -62,10 +63,14 @@ pub(super) fn errors(axis: &Axis, observed: &Observed, servo: &ByServo) -> Optio
     let less =
         |measured: &[f64], model: &[f64]| -> Vec<f64> { measured.iter().zip(model).map(|(m, p)| m - p).collect() };
     let replayed = prediction.closed_loop.as_ref();
+    let table = match replayed {
+        Some(replayed) => replayed.table_position.as_deref().map(Cow::Borrowed),
+        None => predict_table(&prediction.torque.physics, observed).map(Cow::Owned),
+    };
     let channels = [
         Some(torque_errors(observed, &prediction.torque)),
         replayed.map(|r| less(&observed.position, &r.position)),
-        observed.table_position.as_ref().zip(replayed.and_then(|r| r.table_position.as_ref())).map(|(t, r)| less(t, r)),
+        observed.table_position.as_ref().zip(table).map(|(measured, table)| less(measured, &table)),
     ];
     let replay = prediction.manner().zip(channels[1].as_ref()).map(|(manner, error): (Manner, &Vec<f64>)| {
         let rows = replayed::rows(axis, observed);
@@ -301,7 +306,8 @@ pub(super) fn weight_of_rows(frame: &Frame, time_s: &[f64]) -> Vec<f64> {
 #[must_use]
 pub fn of_stretch(before: Option<&Errors>, after: Option<&Errors>) -> Option<Gain> {
     let stretch = |Errors { channels: [_, motor, table], .. }: &Errors| -> Option<Vec<f64>> {
-        Some(table.as_ref()?.iter().zip(motor.as_ref()?).map(|(table, motor)| table - motor).collect())
+        let Some(motor) = motor else { return table.clone() };
+        Some(table.as_ref()?.iter().zip(motor).map(|(table, motor)| table - motor).collect())
     };
     gain("table_position - position", &stretch(before?)?, &stretch(after?)?, Over::All)
 }

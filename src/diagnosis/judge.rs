@@ -302,15 +302,15 @@ fn is_another_curve(bench: &Bench, empty: &Fit, fit: &Fit) -> bool {
 
 /// Whether a machine is no better than the belief: worse in torque and motor position together, and surely so in one of them
 /// or surely better in none. The simulated table carries the motor's error along, with which what the table does may happen to
-/// go. A motor that delivers nothing beyond a level cannot say by its motion how far beyond it was driven: no better torque can
+/// go; without a closed loop it goes behind the measured motor and counts as the motor would. A motor that delivers nothing beyond a level cannot say by its motion how far beyond it was driven: no better torque can
 /// be asked of its machine.
 #[must_use]
 pub fn refuted(gains: &[Gain], causes: &[Effect]) -> bool {
     let silent =
         |cause: &Effect| matches!(cause, Effect::TorqueSaturation { slope_ratio, .. } if *slope_ratio < LEAST_SLOPE);
     let silent = causes.iter().any(silent);
-    let motor =
-        || gains.iter().filter(|gain| gain.channel == "position" || !silent && gain.channel != "table_position");
+    let moved = if gains.iter().any(|gain| gain.channel == "position") { "position" } else { "table_position" };
+    let motor = || gains.iter().filter(|gain| gain.channel == moved || !silent && gain.channel != "table_position");
     let surely_better = silent || gains.iter().any(|gain| gain.ci95[0] > 1.0);
     let surely_worse = motor().any(|gain| gain.ci95[1] < 1.0);
     motor().map(|gain| (gain.before / gain.after).ln()).sum::<f64>() < 0.0 && (surely_worse || !surely_better)

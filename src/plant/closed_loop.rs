@@ -376,7 +376,7 @@ fn replay(
 
 /// A simulated table by the zero of its scale, which nobody knows: half way between those of either way in the rows for phases, where
 /// what a load winds up is none of it and an impact that comes a row early or late weighs little.
-fn at_the_scales_zero(mut simulated: Vec<f64>, observed: &Observed) -> Vec<f64> {
+pub(super) fn at_the_scales_zero(mut simulated: Vec<f64>, observed: &Observed) -> Vec<f64> {
     let (motion, standing) = (&observed.motion, standing(&observed.motion));
     let zero = |way: f64| {
         let pairs = observed.table_position.iter().flatten().zip(&simulated).zip(motion.velocities());

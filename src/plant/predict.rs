@@ -13,6 +13,7 @@
 
 use super::behind::table_motion;
 use super::between::{cubic_at, shift};
+use super::closed_loop::at_the_scales_zero;
 use super::friction::Friction;
 use super::lateness::Lateness;
 use super::linear::{decomposed, rms};
@@ -65,6 +66,32 @@ pub(super) fn torque_of(axis: &Axis, physics: &Physics, observed: &Observed) -> 
     add_ripples(axis, physics, observed, &mut torque);
     Shown::of(axis, physics, observed).delay(observed, &mut torque);
     torque
+}
+
+/// Where the table is behind a motor that moves as measured, load units, by the zero of its scale; `None` without a scale. NaN where the
+/// motion is not known. With a closed loop the replay says that, of a motor that moves as simulated.
+#[must_use]
+pub fn predict_table(physics: &Physics, observed: &Observed) -> Option<Vec<f64>> {
+    observed.table_position.as_ref()?;
+    let mut table = vec![f64::NAN; observed.time_s.len()];
+    for run in &observed.runs {
+        let places = &mut table[run.clone()];
+        match physics.two_masses {
+            Some(masses) => {
+                let behind = table_motion(physics, masses, observed, run.clone());
+                let per_scale = 1.0 / physics.motor_per_load;
+                places
+                    .iter_mut()
+                    .zip(behind)
+                    .for_each(|(table, (place, _))| *table = physics.table_of(place * per_scale));
+            }
+            None => {
+                let motor = &observed.motion.position[run.clone()];
+                places.iter_mut().zip(motor).for_each(|(table, motor)| *table = physics.table_of(*motor));
+            }
+        }
+    }
+    Some(at_the_scales_zero(table, observed))
 }
 
 /// How a torque column shows what the motor delivers.

@@ -2,7 +2,10 @@
 //! and a simulated table swings by the grid alone. Such a spring is found all the same, and one that is believed is not doubted for its
 //! swing.
 
-use crate::generated::{Rig, ServoGains, Truth, rig, said, said_believing, said_of_slow_ways, set_apart};
+use crate::board::rig::Scale;
+use crate::generated::{
+    Rig, ServoGains, Truth, rig, said, said_believing, said_of_slow_ways, said_without_its_servo, set_apart,
+};
 use serde_json::json;
 use std::f64::consts::TAU;
 
@@ -70,5 +73,21 @@ fn rests_between_slow_ways_say_nothing() {
         println!("seed {seed}: {verdict} {findings:?}");
         let [(cause, inertia)] = findings.as_slice() else { panic!("{verdict}: {findings:?}") };
         assert!(cause == "inertia_mismatch" && (inertia / 0.00308 - 1.0).abs() < 0.01, "{cause} {inertia}");
+    }
+}
+
+/// The mean of many steps either way tells less than one of them.
+#[test]
+fn a_scale_tells_a_clearance_of_two_steps_of_the_encoder() {
+    let rig = Rig { encoder_step: 1e-3, table: Some(Scale { step: 7e-4, noise: 3e-4, zero: 0.1 }), ..rig() };
+    let clearance = |truth: &mut Truth| set_apart(truth, 1.9e-3, 700.0, [0.45, 0.4], 0.3);
+    let rigs = [&rig, &rig];
+    for (verdict, findings) in [said(rigs, 6, clearance), said_without_its_servo(rigs, 6, clearance)] {
+        println!("{verdict} {findings:?}");
+        let [(cause, um)] = findings.as_slice() else { panic!("{verdict}: {findings:?}") };
+        assert!(cause == "backlash" && (um / 1.9 - 1.0).abs() < 0.2, "{cause} {um}");
+    }
+    for (verdict, findings) in [said(rigs, 7, |_| {}), said_without_its_servo(rigs, 7, |_| {})] {
+        assert!(verdict == "no_discrepancy" && findings.is_empty(), "{verdict}: {findings:?}");
     }
 }

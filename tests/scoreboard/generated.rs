@@ -9,6 +9,7 @@ use crate::board::truth::Coupling;
 pub use crate::board::truth::Truth;
 use serde_json::Value;
 use std::f64::consts::TAU;
+use std::path::Path;
 
 /// A ball screw of 10 mm under a servo of its own, with an encoder on a grid of 1 µm and a torque that is known well.
 pub fn rig() -> Rig {
@@ -149,8 +150,23 @@ fn said_along(
     random: Random,
     change: impl Fn(&mut Truth),
 ) -> (String, Vec<(String, f64)>) {
-    let folder = recorded(segments, effects, rigs, random, change);
-    let at = |name: &str| folder.path().join(name);
+    said_in(recorded(segments, effects, rigs, random, change).path())
+}
+
+/// What is said of a rig as believed whose servo nobody knows.
+pub fn said_without_its_servo(rigs: [&Rig; 2], seed: u64, change: impl Fn(&mut Truth)) -> (String, Vec<(String, f64)>) {
+    let mut random = Random::new(seed, 7);
+    let folder = recorded(fast_ways(&mut random), Vec::new(), rigs, random, change);
+    let file = folder.path().join("machine.json");
+    let mut machine: Value = serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
+    machine["axes"][0].as_object_mut().unwrap().remove("servo").unwrap();
+    std::fs::write(file, machine.to_string()).unwrap();
+    said_in(folder.path())
+}
+
+/// What is said of what lies in a folder.
+fn said_in(folder: &Path) -> (String, Vec<(String, f64)>) {
+    let at = |name: &str| folder.join(name);
     let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_gib"));
     command.arg("diagnose").arg("--machine").arg(at("machine.json")).arg("--recording").arg(at("run.csv"));
     let output = command.arg("--json").arg(at("said.json")).output().unwrap();

@@ -107,6 +107,10 @@ fn told(
     };
     let Some((effect, own)) = all.effect(frame, without) else { return Ok(None) };
     let deviations = half.trial.effect(frame).map_or(own.clone(), |deepest| widened(own, &deepest, &alike));
+    // A scale has seen the table itself.
+    if frame.columns.table.is_some() && deviations.first() > found.deviations.first() {
+        return Ok(None);
+    }
     let [missed, left] = [&before, &all.error].map(|error| replays.says(error, frame.axis));
     let note = format!(
         "the numbers of the {} are the closed loop's: replayed with those that the torque gives it typically misses the measured position by {missed}, with these by {left}",

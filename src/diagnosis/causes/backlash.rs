@@ -24,7 +24,7 @@ pub static LAW: Law = Law {
     ],
     starts: |frame, _| {
         // A width that is a fifth off meets the flanks at the wrong time and explains little.
-        let least = (3.0 * frame.grid).max(LEAST) * 1e3;
+        let least = least_width(frame).max(LEAST) * 1e3;
         let most = (10.0 * least).max(300.0);
         let count = (most / least).ln() / NEXT.ln();
         let widths = log_spaced(least, most, count.ceil() as usize + 1);
@@ -36,8 +36,9 @@ pub static LAW: Law = Law {
         ..PLAIN
     },
     terms: Terms::Simulated(|_, shape| effect(shape)),
-    // Within three steps of the encoder a turn is no crossing.
-    effect: |frame, shape, _| effect(shape).filter(|_| shape.first().is_some_and(|width| *width > 3e3 * frame.grid)),
+    effect: |frame, shape, _| {
+        effect(shape).filter(|_| shape.first().is_some_and(|width| *width > 1e3 * least_width(frame)))
+    },
     confused_with: &[Cause::PreslidingFriction, Cause::DriveCompliance],
     sentence: |effect, axis| match effect {
         Effect::Backlash { width_um, .. } => format!(
@@ -48,6 +49,12 @@ pub static LAW: Law = Law {
         _ => String::new(),
     },
 };
+
+/// Width within which nothing is told, load units: a turn within three steps of the encoder is no crossing; what a scale has either way
+/// is the mean of many.
+fn least_width(frame: &Frame) -> f64 {
+    if frame.columns.table.is_some() { frame.grid } else { 3.0 * frame.grid }
+}
 
 /// Starts with a width.
 fn of_width(width: f64) -> impl Iterator<Item = Vec<f64>> {

@@ -169,6 +169,12 @@ impl Resistance {
         apart(&self.load, &other.load) > LEANS * LEANS * dot(&self.level, &self.level)
     }
 
+    /// Whether its load alone may lean a table on one flank: how long flanks are apart then goes with the shares of the table as well.
+    #[must_use]
+    pub fn leans(&self) -> bool {
+        dot(&self.load, &self.load) > LEANS * LEANS * dot(&self.level, &self.level)
+    }
+
     /// Whether a table moves under this as under another.
     #[must_use]
     pub fn is_like(&self, other: &Self) -> bool {
