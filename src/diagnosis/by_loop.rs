@@ -25,7 +25,7 @@ use super::fit::Bench;
 use super::frame::Frame;
 use super::gain;
 use super::holdout::Holdout;
-use super::judge::{Excess, LITTLE_LEFT, TOLERABLE_EXCESS, refuted, shows};
+use super::judge::{refuted, shows};
 use super::known::Known;
 use super::left::unexplained;
 use super::progress::{Stopped, Watch};
@@ -35,7 +35,7 @@ use super::verdict::{Diagnosis, Finding, Verdict, confidence};
 use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::observed::Observed;
-use itself::Itself;
+use itself::by_torque;
 use replays::{NOTHING, avoidable};
 use trial::{Refined, Trial, starts};
 
@@ -45,7 +45,8 @@ const MUCH: f64 = 0.9;
 const FEWEST: usize = 3;
 /// Share of the misses beyond that which a cause must explain in rows that gave none of its numbers.
 const LEAST_EXPLAINED: f64 = 0.4;
-/// The same where the torque is left with much that no cause explains.
+/// The same where the torque is left with much that no cause explains; a clearance or a spring that explains less may lie in another valley
+/// than that to which its start led.
 const MOSTLY: f64 = 0.6;
 /// Mean over scatter of what it gains in each block, times √blocks, as many as there are ([`strength`]).
 const SURELY: f64 = 3.0;
@@ -232,6 +233,16 @@ fn told(
         refined.retain(|(.., other)| other.trial.law.cause != Cause::DriveCompliance || spring.0 < ALIKE * gain);
         refined.insert(usize::from(spring.0 < ALIKE * gain), spring);
     }
+    if let Some((gain, gained, half)) = refined.first_mut() {
+        let leaves_much = *gain < MOSTLY * mean(avoidable, JUDGES);
+        if leaves_much && half.trial.law.is_simulated() && strength(gained, misses, JUDGES) > SURELY {
+            let deepest = sharper::in_the_deepest_valley(half.trial.clone(), frame, extended, replays, watch)?;
+            if let Some((deepest, _)) = deepest {
+                *gained = replays.gained(misses, &deepest.error);
+                (*gain, *half) = (mean(gained, JUDGES), deepest);
+            }
+        }
+    }
     let Some((gain, gained, half)) = refined.first() else { return Ok(None) };
     let may_be_named =
         refined.iter().take_while(|other| other.0 > ALIKE * gain).all(|other| other.2.trial.has_a_name());
@@ -314,25 +325,6 @@ fn promising(
     // What gains little beside the best is no rival of it.
     let most = near.first().map_or(0.0, |(missed, _)| gain(*missed));
     Ok(near.into_iter().filter(|(missed, _)| gain(*missed) >= RIVAL * most).map(|(_, trial)| trial).collect())
-}
-
-/// What the torque lets a machine with a cause more explain: all, if it then is off by no more than noise, or than a recording of that
-/// very machine would be, since behind a motor that is known to a step of its encoder a table swings by that step; a part, if it is off by
-/// no more than before; `None` where it gainsays the machine.
-fn by_torque(frame: &Frame, replays: &Replays, [before, with]: [&Axis; 2]) -> Option<Verdict> {
-    let [before, after] = [before, with].map(|axis| Excess::of_machine(axis, frame));
-    // What the table does its scale shows.
-    if after.of_channel(1) > before.of_channel(1).max(LITTLE_LEFT) {
-        return None;
-    }
-    let [before, after] = [before, after].map(|excess| excess.largest());
-    if after <= LITTLE_LEFT || after <= TOLERABLE_EXCESS && after <= before {
-        return Some(Verdict::Explained);
-    }
-    if Itself::of(replays, with).leaves_as_much(frame) {
-        return Some(Verdict::Explained);
-    }
-    (after <= before).then_some(Verdict::PartlyExplained)
 }
 
 #[cfg(test)]

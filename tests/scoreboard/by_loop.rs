@@ -2,6 +2,7 @@
 //! that is another one than is believed is not taken for a cause of the vocabulary.
 
 use crate::generated::{Rig, ServoGains, Truth, rig, said, set_apart};
+use std::f64::consts::TAU;
 
 /// A rig with much friction, a fine encoder and a servo that takes its time.
 fn slow() -> Rig {
@@ -75,4 +76,34 @@ fn another_servo_than_is_believed_is_no_cause() {
 fn a_machine_as_believed_is_told_as_such() {
     let (verdict, findings) = said([&slow(), &slow()], 6, |_| ());
     assert_eq!((verdict.as_str(), findings.as_slice()), ("no_discrepancy", &[][..]));
+}
+
+#[test]
+fn a_clearance_is_found_whose_start_leads_to_another_valley() {
+    let servo = ServoGains {
+        position_gain: 28.0,
+        velocity_gain: 1.19,
+        integral_time: Some(0.0445),
+        feedforward: 0.0,
+        lag: 4.5e-4,
+        ..rig().servo
+    };
+    let rig = Rig {
+        gearing: 16.0,
+        unit: 16.0 / TAU,
+        inertia: 0.00665,
+        coulomb: 3.38,
+        viscous: 0.0111,
+        constant: 0.7,
+        limit: 35.0,
+        servo,
+        encoder_step: 1e-4,
+        torque_noise: 0.12,
+        torque_step: 0.2,
+        ..rig()
+    };
+    let (verdict, findings) = said([&rig, &rig], 5, |truth| set_apart(truth, 0.02, 700.0, [0.63, 0.38], 0.3));
+    println!("{verdict} {findings:?}");
+    let [(cause, um)] = findings.as_slice() else { panic!("{verdict}: {findings:?}") };
+    assert!(cause == "backlash" && (um / 20.0 - 1.0).abs() < 0.02, "{cause} of {um} µm");
 }

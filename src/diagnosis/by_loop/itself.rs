@@ -12,7 +12,7 @@ use super::replays::Replays;
 use crate::diagnosis::belief;
 use crate::diagnosis::fit::Bench;
 use crate::diagnosis::frame::{Columns, Frame};
-use crate::diagnosis::judge::{Excess, LITTLE_LEFT};
+use crate::diagnosis::judge::{Excess, LITTLE_LEFT, TOLERABLE_EXCESS};
 use crate::diagnosis::known::Known;
 use crate::diagnosis::quiet;
 use crate::diagnosis::show::{self, Coordinate};
@@ -155,4 +155,24 @@ pub fn settled(mut found: Diagnosis, replays: &Replays, frame: &Frame) -> Diagno
         _ => (),
     }
     found
+}
+
+/// What the torque lets a machine with a cause more explain: all, if it then is off by no more than noise, or than a recording of that
+/// very machine would be, since behind a motor that is known to a step of its encoder a table swings by that step; a part, if it is off by
+/// no more than before; `None` where it gainsays the machine.
+#[must_use]
+pub fn by_torque(frame: &Frame, replays: &Replays, [before, with]: [&Axis; 2]) -> Option<Verdict> {
+    let [before, after] = [before, with].map(|axis| Excess::of_machine(axis, frame));
+    // What the table does its scale shows.
+    if after.of_channel(1) > before.of_channel(1).max(LITTLE_LEFT) {
+        return None;
+    }
+    let [before, after] = [before, after].map(|excess| excess.largest());
+    if after <= LITTLE_LEFT || after <= TOLERABLE_EXCESS && after <= before {
+        return Some(Verdict::Explained);
+    }
+    if Itself::of(replays, with).leaves_as_much(frame) {
+        return Some(Verdict::Explained);
+    }
+    (after <= before).then_some(Verdict::PartlyExplained)
 }

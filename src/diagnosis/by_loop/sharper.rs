@@ -5,9 +5,10 @@
 //! follow the encoder. It has valleys as well: the table of a clearance slows down by its friction over its inertia, which are known well
 //! together, and its impact goes as width times inertia. The loop is asked in each about the numbers that were found.
 
+use super::itself::by_torque;
 use super::replays::{NOTHING, Over, Replays, avoidable, mean, mean_of_worse_half, misses, strength};
 use super::trial::{Refined, Trial};
-use super::{ABOUT_REVERSALS, GIVES, JUDGES, STAGE, Told, answered, by_torque};
+use super::{ABOUT_REVERSALS, GIVES, JUDGES, STAGE, Told, answered};
 use crate::analysis::statistics;
 use crate::diagnosis::causes::law;
 use crate::diagnosis::excerpt::Excerpt;
@@ -121,7 +122,7 @@ fn told(
 }
 
 /// The same where one half of the blocks is missed least, of the valleys about where it was, and where that half is missed as little.
-fn in_the_deepest_valley(
+pub fn in_the_deepest_valley(
     start: Trial,
     frame: &Frame,
     without: &Axis,
