@@ -370,7 +370,7 @@ pub fn ratio_of(before: &[f64], after: &[f64], sizes: &[f64]) -> (f64, f64, [f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::Machine;
+    use crate::machine::{Effect, Machine};
     use crate::plant::moves::{Moves, Reach};
     use crate::plant::simulate::{Setup, simulate};
     use crate::recording::{Column, Recording};
@@ -399,5 +399,37 @@ mod tests {
         assert_eq!(in_stretches(&short).runs, short.runs);
         let away = predict_torque(&axis, &few).unwrap();
         assert!(torque_errors(&few, &away).iter().filter(|error| error.is_finite()).count() > 1000);
+    }
+
+    #[test]
+    fn without_a_servo_the_table_is_told_behind_the_measured_motor() {
+        let mut believed =
+            Machine::parse(include_str!("../../examples/machines/believed.json")).unwrap().axes.remove(0);
+        let clearance = Effect::Backlash {
+            width_um: 20.0,
+            table_inertia_share: 0.4,
+            table_friction_share: 0.6,
+            contact_hz: 700.0,
+            contact_damping_ratio: 0.3,
+        };
+        let reach = Reach { start: 20.0, stroke: 200.0, speed: 250.0, acceleration: 2500.0 };
+        let mut command = Moves::built_in("test", &reach).unwrap().command(1e-3);
+        command.truncate(15_000);
+        let trace = simulate(&believed.with_effects(vec![clearance]), &command, &Setup::default()).unwrap();
+        let columns = vec![
+            Column::new("x.position_mm", trace.position),
+            Column::new("x.table_position_mm", trace.table_position),
+            Column::new("x.torque_nm", trace.torque),
+        ];
+        believed.servo = None;
+        let recording = Recording::from_columns("simulated", trace.time_s, columns).unwrap();
+        let observed = Observed::of(&recording, &believed).unwrap();
+        let of = |axis: &Axis| errors(axis, &observed, &ByServo::of(axis, &observed)).unwrap();
+        let [before, after] = [&believed, &believed.with_effects(vec![clearance])].map(of);
+        let gains = gains(&believed, &before, &after, Over::All);
+        let [torque, table] = gains.as_slice() else { panic!("{gains:?}") };
+        assert!(torque.channel == "torque" && table.channel == "table_position", "{gains:?}");
+        // Half of the clearance either way, which crosses it at a turn. Where in it the table lies at first nobody knows.
+        assert!((0.008..0.012).contains(&table.before) && table.after < 0.3 * table.before, "{table:?}");
     }
 }
