@@ -143,17 +143,15 @@ fn a_vibration_in_a_narrow_band_is_named_and_noise_of_any_colour_is_none() {
         rows.split_off(30_000)
     };
     let of = |rows: Vec<f64>| judged(&recording(|t, _, _, _| rows[(t * 1e3).round() as usize]));
-    let mut confidence = Vec::new();
-    for (hz, size) in [(6.2, 0.1), (17.3, 0.1), (17.3, 0.02)] {
+    let confidence = [(6.2, 0.1), (17.3, 0.1), (17.3, 0.02)].map(|(hz, size)| {
         let found = of(resonant(hz, 8.0, size));
         let [finding] = found.findings.as_slice() else { panic!("{:?} {:?}", found.verdict, found.findings) };
         let Effect::ExternalVibration { frequency_hz, .. } = finding.effect else { panic!("{finding:?}") };
         assert!((frequency_hz - hz).abs() < 2.5 * finding.deviations[0] && finding.deviations[0] < 0.1, "{finding:?}");
         assert!(found.extended == axis() && found.notes.len() == 1, "{:?}", found.notes);
-        confidence.push(finding.confidence);
-    }
-    // A weaker one is less sure.
-    assert!(confidence[2] < confidence[1] && confidence[2] > 0.95, "{confidence:?}");
+        finding.confidence
+    });
+    assert!(0.95 < confidence[2] && confidence[2] < confidence[1], "a weaker one is less sure: {confidence:?}");
     // Wide: a fortieth of a second.
     let found = of(resonant(12.0, 0.025, 0.1));
     assert!(found.findings.is_empty(), "{:?}", found.findings);
