@@ -18,8 +18,6 @@ struct State<const N: usize> {
     side: [f64; N],
     /// How the motor has given way.
     given: [[f64; N]; 3],
-    /// How friction has built up on the way of each, where it does.
-    bristles: Option<Bristles<N>>,
     /// Not known to move with the motor.
     loose: [bool; N],
 }
@@ -39,11 +37,10 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
             together: [0; N],
             side: [0.0; N],
             given: [[0.0; N]; 3],
-            bristles: self.bristles,
             loose: [false; N],
         };
-        // Where a table moves with the motor its friction has built up as the motor's way has it.
-        let mut with_motor = self.bristles;
+        // How friction has built up on the way of each table, and as the motor's way has it where a table moves with that.
+        let (mut bristles, mut with_motor) = (self.bristles, self.bristles);
         let mut any = false;
         extra[rows.start] = [0.0; N];
         if let Some(last) = lag.get_mut(rows.end - 1) {
@@ -85,7 +82,7 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
                     state.speed[l] = self.frame.raw_speed[i] * unit;
                     state.together[l] = 0;
                     (state.given[0][l], state.given[1][l], state.given[2][l]) = (0.0, 0.0, load[l]);
-                    if let (Some(bristles), Some(with_motor)) = (&mut state.bristles, &with_motor) {
+                    if let (Some(bristles), Some(with_motor)) = (&mut bristles, &with_motor) {
                         bristles.take(l, with_motor);
                     }
                 }
@@ -96,7 +93,7 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
                 *lag = lanes(|l| (state.position[l] - motor) / unit);
             }
             if any {
-                let [near, far] = self.between(i, giving, &mut state);
+                let [near, far] = self.between(i, giving, &mut state, bristles.as_mut());
                 let rigid = self.rigid(i);
                 for l in (0..N).filter(|l| state.loose[*l]) {
                     extra[i][l] += near[l] - rigid[0][l];
@@ -110,22 +107,37 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
     /// Moves the tables on by one row; answers the share of each link's torque that belongs to the row and to the next one, by
     /// how near it acts.
     #[inline(always)]
-    fn between(&self, row: usize, yielding: Giving, state: &mut State<N>) -> [[f64; N]; 2] {
+    fn between(
+        &self,
+        row: usize,
+        yielding: Giving,
+        state: &mut State<N>,
+        bristles: Option<&mut Bristles<N>>,
+    ) -> [[f64; N]; 2] {
         let resisting = self.resisting_tables(row);
         let dry: [f64; N] = lanes(|l| self.mobility[l] * resisting.friction[l]);
-        let mut bristles = state.bristles.take();
-        let shared = match &mut bristles {
+        match bristles {
             // Dry friction takes what speed it can, and never turns it.
-            None => self.stepping(row, yielding, state, &resisting, |free, _| {
-                lanes(|l| larger(smaller(free[l], dry[l]), -dry[l]))
-            }),
-            Some(bristles) => self.stepping(row, yielding, state, &resisting, |_, v| {
-                let torque = bristles.moved(v.map(|v| self.step_s * v), resisting.level);
-                lanes(|l| self.mobility[l] * self.share[l] * torque[l])
-            }),
-        };
-        state.bristles = bristles;
-        shared
+            None => self.stepping(
+                row,
+                yielding,
+                state,
+                &resisting,
+                #[inline(always)]
+                |free, _| lanes(|l| larger(smaller(free[l], dry[l]), -dry[l])),
+            ),
+            Some(bristles) => self.stepping(
+                row,
+                yielding,
+                state,
+                &resisting,
+                #[inline(always)]
+                |_, v| {
+                    let torque = bristles.moved(lanes(|l| self.step_s * v[l]), resisting.level);
+                    lanes(|l| self.mobility[l] * self.share[l] * torque[l])
+                },
+            ),
+        }
     }
 
     /// The same by what `rub` takes off the speeds that the tables would have, from those that they had.

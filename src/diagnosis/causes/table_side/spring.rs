@@ -96,23 +96,33 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         lag: &mut [[f64; N]],
     ) {
         match self.bristles {
-            None => self.moving(sliding, rows, extra, lag, |way, x, v, at| {
-                let slid = sliding.moved(way, x, v, &at.load, &at.friction);
-                slid.unwrap_or_else(|| {
-                    let most: [f64; N] = lanes(|l| self.mobility[l] * at.friction[l]);
-                    let rub = |l: usize, free: f64| larger(smaller(free, most[l]), -most[l]);
-                    self.stepped(&Way { at: 0.0, ..*way }, *x, *v, sliding.steps, at.load, rub)
-                })
-            }),
+            None => self.moving(
+                sliding,
+                rows,
+                extra,
+                lag,
+                #[inline(always)]
+                |way, x, v, at| match sliding.moved(way, x, v, &at.load, &at.friction) {
+                    Some(slid) => slid,
+                    None => self.rubbed(&Way { at: 0.0, ..*way }, *x, *v, sliding.steps, at),
+                },
+            ),
             Some(mut bristles) => {
                 let half = 0.5 * sliding.share * self.frame.columns.period_s;
-                self.moving(sliding, rows, extra, lag, |way, x, v, at| {
-                    let half_way = bristles.after(v.map(|v| half * v), at.level);
-                    let rub = lanes(|l| at.load[l] + self.share[l] * half_way[l]);
-                    let moved = sliding.moved_against(way, x, v, &rub);
-                    bristles.moved(lanes(|l| moved.position[l] - x[l]), at.level);
-                    moved
-                });
+                self.moving(
+                    sliding,
+                    rows,
+                    extra,
+                    lag,
+                    #[inline(always)]
+                    |way, x, v, at| {
+                        let half_way = bristles.after(lanes(|l| half * v[l]), at.level);
+                        let rub = lanes(|l| at.load[l] + self.share[l] * half_way[l]);
+                        let moved = sliding.moved_against(way, x, v, &rub);
+                        bristles.moved(lanes(|l| moved.position[l] - x[l]), at.level);
+                        moved
+                    },
+                );
             }
         }
     }
@@ -165,6 +175,14 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
                 extra[i + 1][l] = far[l] * per_step - rigid[1][l];
             }
         }
+    }
+
+    /// Makes so many steps against dry friction, which may hold a table or turn it.
+    #[inline(always)]
+    fn rubbed(&self, way: &Way, x: [f64; N], v: [f64; N], steps: usize, at: &Resisting<N>) -> Moved<N> {
+        let most: [f64; N] = lanes(|l| self.mobility[l] * at.friction[l]);
+        let rub = |l: usize, free: f64| larger(smaller(free, most[l]), -most[l]);
+        self.stepped(way, x, v, steps, at.load, rub)
     }
 
     /// Makes so many steps; `rub` says what dry friction takes off a speed.
