@@ -21,8 +21,8 @@ const STICKING: [f64; 3] = [0.1, 0.3, 0.8];
 const STEP_OF_LOG: f64 = 0.04;
 const STEPS_OF_LINEAR: f64 = 2.0;
 const STEP_OF_COEFFICIENT: f64 = 0.05;
-/// Shares of a step that are tried.
-const SHARES: [f64; 3] = [1.0, 0.5, 0.2];
+/// Shares of a step that are tried, side by side, and if none is better.
+const SHARES: [&[f64]; 2] = [&[1.0, 0.5], &[0.2]];
 /// Of the starts of a spring one in so many is tried.
 const EVERY_SPRING: usize = 3;
 /// Shares of inertia and friction behind a clearance or a spring, and how hard flanks meet, Hz, at which it is tried: what of it the loop
@@ -160,7 +160,20 @@ impl Trial {
         let inside = |(scale, value): (&Scale, &f64)| (scale.moved(*value, 0.0) - value).abs() <= 1e-9 * value.abs();
         let is_inside = |shape: &Vec<f64>| self.law.scales.iter().zip(shape).all(inside);
         let with = |shape: Vec<f64>| Self { shape, ..self.clone() };
-        AGAIN.into_iter().flat_map(ways).filter(is_inside).map(with).collect()
+        let mut places: Vec<Self> = Vec::new();
+        for place in AGAIN.into_iter().flat_map(ways).filter(is_inside).map(with) {
+            // Several ways lead nowhere from where it stands.
+            if !places.iter().any(|other| other.is_at(&place)) {
+                places.push(place);
+            }
+        }
+        places
+    }
+
+    /// Whether it has the numbers of another trial of its law.
+    #[must_use]
+    pub fn is_at(&self, other: &Self) -> bool {
+        self.shape == other.shape
     }
 
     /// The effect that it stands for; `None` beyond physical bounds.
@@ -321,20 +334,18 @@ impl Trial {
             if step == STEPS || step >= FEW && miss(&left) > hopeful {
                 break;
             }
-            let tried = SHARES.par_iter().filter_map(|share| {
+            let gone = |share: &f64| {
                 let moved = trial.moved(&numbers, (&by * *share).as_slice());
                 let error = error(&moved)?;
                 Some((miss(&error), moved, error))
-            });
-            match tried.min_by(|a, b| a.0.total_cmp(&b.0)) {
-                Some((less, moved, error)) if less < miss(&left) => {
-                    let little = miss(&left) - less < LITTLE;
-                    (trial, left) = (moved, error);
-                    if little {
-                        break;
-                    }
-                }
-                _ => break,
+            };
+            let before = miss(&left);
+            let least = |shares: &&[f64]| shares.par_iter().filter_map(gone).min_by(|a, b| a.0.total_cmp(&b.0));
+            let better = SHARES.iter().filter_map(least).find(|(missed, ..)| *missed < before);
+            let Some((missed, moved, error)) = better else { break };
+            (trial, left) = (moved, error);
+            if before - missed < LITTLE {
+                break;
             }
         }
         Some(Refined { trial, error: left, covariance })
