@@ -148,6 +148,12 @@ pub fn extended(axis: &Axis, found: &[Effect]) -> Axis {
     axis.with_effects(effects)
 }
 
+/// The axis without effects of these causes.
+#[must_use]
+pub fn without(axis: &Axis, causes: &[Cause]) -> Axis {
+    axis.with_effects(axis.effects.iter().copied().filter(|effect| !causes.contains(&effect.cause())).collect())
+}
+
 /// The axis with effects as a fit on the axis `fitted` found them.
 #[must_use]
 pub fn with_found(axis: &Axis, fitted: &Axis, found: Vec<Effect>) -> Axis {

@@ -6,9 +6,9 @@ use std::ops::Range;
 /// The frame's blocks, cut further where one holds more than a share `most` of one of these traces: what happens in one place,
 /// as a single rapid in which the motor saturates, can only be told by one part of it from another.
 #[must_use]
-pub fn within(bench: &Bench, traces: &[Vec<f64>], most: f64) -> Vec<Range<usize>> {
+pub fn within<T: AsRef<[f64]>>(bench: &Bench, traces: &[T], most: f64) -> Vec<Range<usize>> {
     let stacked = |row: usize| [Some(row), (bench.measured.len() > bench.rows).then_some(row + bench.rows)];
-    let square = |trace: &Vec<f64>, row: usize| stacked(row).iter().flatten().map(|&k| trace[k] * trace[k]).sum();
+    let square = |trace: &T, row: usize| stacked(row).iter().flatten().map(|&k| trace.as_ref()[k].powi(2)).sum();
     cut(bench.frame.blocks.windows(2).map(|block| block[0]..block[1]), traces, square, most)
 }
 

@@ -8,6 +8,7 @@
 //! which no law holds to. Such causes are tried as rivals alone. A servo that is another one than is believed is no cause of the
 //! vocabulary, and none explains what it makes.
 
+mod changed;
 mod itself;
 mod replays;
 mod sharper;
@@ -78,26 +79,28 @@ pub fn completed(
     found: Diagnosis,
     watch: &Watch,
 ) -> Result<Diagnosis, Stopped> {
-    let about = |effect: &Effect| ABOUT_REVERSALS.contains(&effect.cause());
-    let named: Vec<Cause> =
-        found.findings.iter().map(|finding| finding.effect).filter(about).map(|effect| effect.cause()).collect();
+    let about = |cause: &Cause| ABOUT_REVERSALS.contains(cause);
+    let named: Vec<Cause> = found.findings.iter().map(|finding| finding.effect.cause()).filter(about).collect();
+    let believed: Vec<&Effect> = axis.effects.iter().filter(|effect| about(&effect.cause())).collect();
     // Where more of these are there the loop misses by what their numbers are off by, for which another stands in.
-    let silent = axis.effects.iter().any(about) || named.len() > 1;
-    let Some(replays) = replays.filter(|_| !silent) else { return Ok(found) };
+    let Some(replays) = replays.filter(|_| believed.len() + named.len() <= 1) else { return Ok(found) };
     let floor = statistics::reading_error(&replays.whole.columns.position);
     if !is_much(&misses(&replays.known.error, floor)) {
         return Ok(found);
     }
     let Some(missed) = Missed::by(&found.extended, replays) else { return Ok(found) };
-    let without = |dropped: &[Cause]| {
-        let stays = found.extended.effects.iter().filter(|effect| !dropped.contains(&effect.cause())).copied();
-        found.extended.with_effects(stays.collect())
-    };
+    if let [believed] = believed.as_slice() {
+        return changed::corrected(axis, (replays, holdout), frame, (found, believed, &missed), watch);
+    }
     let asked = |dropped: &[Cause]| -> Result<Option<(f64, Told)>, Stopped> {
-        let without = without(dropped);
+        let without = belief::without(&found.extended, dropped);
         let base = belief::base_alone(&without);
         let machines = [&found.extended, &without];
-        let told = told(axis, replays, &frame.believing(&base), (&missed, machines), watch)?;
+        let frame = frame.believing(&base);
+        let named = |law: &Law| without.effects.iter().any(|effect| effect.cause() == law.cause);
+        let open = LAWS.iter().copied().filter(|law| belief::may_be_found(axis, law.cause) && !named(law));
+        let trials = open.flat_map(|law| starts(&frame, law)).collect();
+        let told = told(trials, replays, &frame, (&missed, machines), watch)?;
         Ok(told.filter(|(_, told)| !dropped.contains(&told.finding.effect.cause())))
     };
     // One that the torque names may stand in for another, and gives way to that. Friction that rises at low speed the torque shows in many
@@ -114,7 +117,7 @@ pub fn completed(
         asked(&named)?.map(|(_, told)| (told, named.as_slice()))
     };
     if let Some((told, dropped)) = best {
-        let without = without(dropped);
+        let without = belief::without(&found.extended, dropped);
         let mut stays = found.clone();
         stays.findings.retain(|finding| !dropped.contains(&finding.effect.cause()));
         let rest = 1.0 - stays.findings.iter().map(|finding| finding.share).sum::<f64>().min(1.0);
@@ -207,16 +210,16 @@ struct Told {
     by_half: Axis,
 }
 
-/// What the loop tells beside the second machine, and better than the first does, which misses by so much; and what is missed still, by
-/// numbers from one half of the blocks in the other.
+/// Which of these causes the loop tells beside the second machine, and better than the first does, which misses by so much; and what is
+/// missed still, by numbers from one half of the blocks in the other.
 fn told(
-    axis: &Axis,
+    trials: Vec<Trial>,
     replays: &Replays,
     frame: &Frame,
     (Missed { error: before, misses, avoidable }, [named, extended]): (&Missed, [&Axis; 2]),
     watch: &Watch,
 ) -> Result<Option<(f64, Told)>, Stopped> {
-    let best = promising(axis, &replays.beginning(), frame, extended, watch)?;
+    let best = promising(trials, &replays.beginning(), frame, extended, watch)?;
     let enough = |over| LEAST_EXPLAINED * mean(avoidable, over);
     let hopeful = mean(misses, GIVES) - HOPE * enough(GIVES);
     let refine = |trial: Trial| {
@@ -277,16 +280,21 @@ fn told(
         indistinguishable_from: alike,
     };
     let [missed, left] = [before, &whole.error].map(|error| replays.says(error, frame.axis));
+    let [so, without, with] = if named.effects.iter().any(|effect| effect.cause() == cause) {
+        ["is not as it is believed to be, which is", "as it is believed to be", "as it was found"]
+    } else {
+        ["is", "without it", "with it"]
+    };
     let note = format!(
-        "{} is told by the closed loop, not by the torque: replayed without it the loop typically misses the measured position by {missed}, with it by {left}",
+        "{} {so} told by the closed loop, not by the torque: replayed {without} the loop typically misses the measured position by {missed}, {with} by {left}",
         cause.name()
     );
     Ok(Some((mean(misses, JUDGES) - gain, Told { verdict, finding, note, by_half })))
 }
 
-/// The causes that take most off what a machine misses in the beginning of the recording, each where it takes most.
+/// Of these the causes that take most off what a machine misses in the beginning of the recording, each where it takes most.
 fn promising(
-    axis: &Axis,
+    trials: Vec<Trial>,
     replays: &Replays,
     frame: &Frame,
     extended: &Axis,
@@ -294,9 +302,6 @@ fn promising(
 ) -> Result<Vec<Trial>, Stopped> {
     let Some(before) = replays.error(extended) else { return Ok(Vec::new()) };
     let missed = |error: &[f64]| mean(&replays.misses(error), GIVES);
-    let named = |law: &Law| extended.effects.iter().any(|effect| effect.cause() == law.cause);
-    let open = LAWS.iter().copied().filter(|law| belief::may_be_found(axis, law.cause) && !named(law));
-    let trials: Vec<Trial> = open.flat_map(|law| starts(frame, law)).collect();
     let sized = watch.each(&trials, (0.98, 0.985), STAGE, |trial| {
         let (trial, error) = trial.clone().sized(frame, extended, replays, &before, GIVES)?;
         Some((missed(&error), trial))

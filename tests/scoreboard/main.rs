@@ -11,6 +11,7 @@ mod generated;
 mod leaning;
 mod predicted;
 mod quiet;
+mod saturated;
 mod worm;
 
 use board::case::{Case, Kind, LEAST};

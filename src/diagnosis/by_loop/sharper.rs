@@ -65,8 +65,7 @@ pub fn sharpened(
     if [GIVES, JUDGES].iter().any(|half| mean_of_worse_half(&missed, *half) < ASKED) {
         return Ok(None);
     }
-    let stays = found.extended.effects.iter().filter(|effect| effect.cause() != cause).copied();
-    let without = found.extended.with_effects(stays.collect());
+    let without = belief::without(&found.extended, &[cause]);
     let base = belief::base_alone(&without);
     let frame = &frame.believing(&base);
     let told = told(replays, frame, [&found.extended, &without], (parting, found.verdict), watch)?;
