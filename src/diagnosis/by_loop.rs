@@ -410,19 +410,22 @@ pub(super) mod tests {
 
     /// What it makes of an answer that found these.
     fn told_beside(named: &[Effect], excerpt: &Excerpt) -> Vec<Effect> {
-        let whole = excerpt.columns.as_ref().unwrap();
-        let (belief, thinned) = (rig(), whole.clone().thinned());
-        let base = belief::base_alone(&belief);
-        let frame = Frame::new(&base, &thinned, None);
-        let silent = found(named, &frame, whole);
-        let (watch, replay) = (Watch::new(&|_, _| true), silent.replay.clone());
-        let whole = Whole::new(&belief, whole);
-        let replays = Replays::new(&whole, replay.as_ref(), &watch);
-        let answer = completed(&belief, (replays.as_ref(), None), &frame, silent, &watch).unwrap();
-        answer.findings.iter().map(|finding| finding.effect).collect()
+        answer_beside(&rig(), named, excerpt).findings.iter().map(|finding| finding.effect).collect()
     }
 
-    fn clearance(width_um: f64) -> Effect {
+    /// The same by a belief that has effects itself.
+    pub(super) fn answer_beside(belief: &Axis, named: &[Effect], excerpt: &Excerpt) -> Diagnosis {
+        let whole = excerpt.columns.as_ref().unwrap();
+        let (base, thinned) = (belief::base_alone(belief), whole.clone().thinned());
+        let frame = Frame::new(&base, &thinned, None);
+        let mut silent = found(&[&belief.effects, named].concat(), &frame, whole);
+        silent.findings.retain(|finding| named.contains(&finding.effect));
+        let (watch, replay, whole) = (Watch::new(&|_, _| true), silent.replay.clone(), Whole::new(belief, whole));
+        let replays = Replays::new(&whole, replay.as_ref(), &watch);
+        completed(belief, (replays.as_ref(), None), &frame, silent, &watch).unwrap()
+    }
+
+    pub(super) fn clearance(width_um: f64) -> Effect {
         Effect::Backlash {
             width_um,
             table_inertia_share: 0.4,

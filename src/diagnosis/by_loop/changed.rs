@@ -45,35 +45,14 @@ fn is_another(found: &Finding, believed: &Effect) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{found, recorded, rig};
-    use super::super::{Replays, completed};
+    use super::super::tests::{answer_beside, clearance, recorded, rig};
     use super::*;
-    use crate::diagnosis::whole::Whole;
 
     /// What the loop finds of a rig with one effect that is believed to be another; `None` where it stays with the belief.
     fn found_by_loop(hidden: Effect, believed: Effect) -> Option<Finding> {
-        let excerpt = recorded(&[hidden], 0.05);
-        let whole = excerpt.columns.as_ref().unwrap();
-        let (axis, thinned) = (rig().with_effects(vec![believed]), whole.clone().thinned());
-        let base = belief::base_alone(&axis);
-        let frame = Frame::new(&base, &thinned, None);
-        let before = Diagnosis { findings: Vec::new(), ..found(&[believed], &frame, whole) };
-        let (watch, replay) = (Watch::new(&|_, _| true), before.replay.clone());
-        let whole = Whole::new(&axis, whole);
-        let replays = Replays::new(&whole, replay.as_ref(), &watch);
-        let mut answer = completed(&axis, (replays.as_ref(), None), &frame, before, &watch).unwrap();
+        let mut answer = answer_beside(&rig().with_effects(vec![believed]), &[], &recorded(&[hidden], 0.05));
         assert!(answer.findings.len() <= 1 && answer.extended.effects.len() == 1, "{:?}", answer.findings);
         answer.findings.pop().inspect(|finding| assert_eq!(answer.extended.effects, [finding.effect]))
-    }
-
-    fn clearance(width_um: f64) -> Effect {
-        Effect::Backlash {
-            width_um,
-            table_inertia_share: 0.4,
-            table_friction_share: 0.6,
-            contact_hz: 600.0,
-            contact_damping_ratio: 0.3,
-        }
     }
 
     fn builds_up(displacement_um: f64) -> Effect {

@@ -170,7 +170,7 @@ impl Trial {
         places
     }
 
-    /// Whether it has the numbers of another trial of its law.
+    /// Whether it has the numbers of another trial of its law, but for its size.
     #[must_use]
     pub fn is_at(&self, other: &Self) -> bool {
         self.shape == other.shape
