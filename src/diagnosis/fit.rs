@@ -18,7 +18,7 @@ use super::causes::{Law, Resistance, Rest, Term, Trace};
 use super::frame::Frame;
 use super::known::Known;
 use super::many::{add, dot};
-use crate::machine::Effect;
+use crate::machine::{Cause, Effect};
 use crate::plant::linear::decomposed;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -350,6 +350,13 @@ impl Fit {
     #[must_use]
     pub fn table(&self) -> Option<usize> {
         self.parts.iter().position(|part| part.law.is_simulated())
+    }
+
+    /// Whether the trace of one part goes with the numbers of others.
+    #[must_use]
+    pub fn goes_together(&self) -> bool {
+        let has = |cause| self.parts.iter().any(|part| part.law.cause == cause);
+        self.table().is_some() || has(Cause::DeadTime) && has(Cause::TorqueSaturation)
     }
 
     /// Number of fitted numbers.

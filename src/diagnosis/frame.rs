@@ -326,10 +326,10 @@ impl<'a> Frame<'a> {
         })
     }
 
-    /// A function of the measured torque, filtered and aligned as the torque is.
+    /// A function of the measured torque, filtered and aligned as the torque is if it is late by `late_s` beyond what is known.
     #[must_use]
-    pub fn aligned(&self, values: &[f64]) -> Vec<f64> {
-        let shift = (self.sampling.shift_s + self.believed_late_s) / self.columns.period_s;
+    pub fn aligned(&self, values: &[f64], late_s: f64) -> Vec<f64> {
+        let shift = (self.sampling.shift_s + self.believed_late_s + late_s) / self.columns.period_s;
         let (rows, between) = (shift.floor(), shift - shift.floor());
         // Catmull and Rom's weights at that place between rows −1, 0, 1 and 2, with a fifth that makes the kernel odd.
         let unit =

@@ -1,11 +1,13 @@
 //! Torque and position columns are not of one instant: the torque logged at t is that of t − delay. Looks like friction at
 //! constant acceleration and like inertia at reversals, so it is tried with the others from the start.
 
+use super::torque_saturation::beyond;
 use super::*;
+use crate::diagnosis::many::add;
 use crate::diagnosis::sampling::Timing;
 
 /// Parameter: by how much later the column is, in ms, which between whole cycles is not the delay ([`crate::plant::lateness`]).
-/// The trace is the measured torque less itself moved up; it has no coefficient.
+/// The trace is what the motor delivers by the measured torque less the same moved up; it has no coefficient.
 pub static LAW: Law = Law {
     cause: Cause::DeadTime,
     scales: &[Scale::Linear(-50.0, 50.0, 0.05)],
@@ -19,11 +21,19 @@ pub static LAW: Law = Law {
         (-count..=count).filter(|i| *i != 0).map(|i| vec![f64::from(i) * step]).collect()
     },
     manner: PLAIN,
-    terms: Terms::ByRows(|frame, shapes| {
-        let torque = frame.torque(0.0);
+    terms: Terms::Delivered(|frame, saturation, shapes| {
+        let beyond = saturation.map(|(limit, slope_ratio)| (beyond(frame, limit), 1.0 - slope_ratio));
+        let delivered = |late_s: f64| {
+            let mut torque = frame.torque(late_s);
+            if let Some((beyond, lost)) = &beyond {
+                add(&mut torque, -lost, &frame.aligned(beyond, late_s));
+            }
+            torque
+        };
+        let unmoved = delivered(0.0);
         each(shapes, |shape| {
-            let moved = frame.torque(1e-3 * shape[0]);
-            let fixed = torque.iter().zip(moved).map(|(a, b)| a - b).collect();
+            let moved = delivered(1e-3 * shape[0]);
+            let fixed = unmoved.iter().zip(moved).map(|(a, b)| a - b).collect();
             Term { fixed: Some(Trace::torque(fixed)), regressors: Vec::new() }
         })
     }),

@@ -135,10 +135,15 @@ const PLAIN: Manner = Manner {
 /// Traces by what is between motor and table.
 type TermsBehind = fn(&Frame, Option<&TwoMasses>, &[Vec<f64>]) -> Vec<Term>;
 
+/// Traces by from where on the motor delivers less than its current says, and how much of what its current adds, where it does.
+type TermsDelivered = fn(&Frame, Option<(f64, f64)>, &[Vec<f64>]) -> Vec<Term>;
+
 /// How traces are come by, one for each set of non-linear parameters.
 pub enum Terms {
     /// Worked out row by row.
     ByRows(fn(&Frame, &[Vec<f64>]) -> Vec<Term>),
+    /// The same, by what the motor makes of its current.
+    Delivered(TermsDelivered),
     /// The same, by what the axis has between motor and table where a scale shows it, of what shakes the table; and how it does by non-linear parameters and
     /// coefficients.
     Shaking(TermsBehind, fn(&Frame, &[f64], &[f64]) -> Option<Shaking>),
@@ -172,6 +177,7 @@ impl Law {
     pub fn terms(&self, frame: &Frame, resistance: &Resistance, shapes: &[Vec<f64>]) -> Vec<Term> {
         match self.terms {
             Terms::ByRows(terms) => terms(frame, shapes),
+            Terms::Delivered(terms) => terms(frame, resistance.saturation(), shapes),
             Terms::Shaking(terms, _) => terms(frame, resistance.link(), shapes),
             Terms::Simulated(effect) => {
                 let effects: Vec<Option<Effect>> = shapes.iter().map(|shape| effect(frame, shape)).collect();
@@ -194,6 +200,7 @@ impl Law {
     pub fn is_otherwise(&self, under: &Resistance, other: &Resistance) -> bool {
         match self.terms {
             Terms::ByRows(_) => false,
+            Terms::Delivered(_) => under.saturation() != other.saturation(),
             Terms::Shaking(..) => under.link() != other.link(),
             Terms::Simulated(_) => !under.is_like(other),
         }

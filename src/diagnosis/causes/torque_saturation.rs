@@ -22,12 +22,7 @@ const fn with_effect(effect: fn(&Frame, &[f64], &[f64]) -> Option<Effect>) -> La
         starts: |_, _| (0..10).map(|i| vec![0.12 * 1.25f64.powi(i)]).collect(),
         manner: PLAIN,
         terms: Terms::ByRows(|frame, shapes| {
-            each(shapes, |shape| {
-                let limit = shape[0] * peak(frame);
-                let beyond: Vec<f64> =
-                    frame.columns.torque.iter().map(|t| t.signum() * (t.abs() - limit).max(0.0)).collect();
-                Term::torque(frame.aligned(&beyond))
-            })
+            each(shapes, |shape| Term::torque(frame.aligned(&beyond(frame, shape[0] * peak(frame)), 0.0)))
         }),
         effect,
         confused_with: &[Cause::InertiaMismatch, Cause::QuadraticDrag],
@@ -41,6 +36,11 @@ const fn with_effect(effect: fn(&Frame, &[f64], &[f64]) -> Option<Effect>) -> La
             _ => String::new(),
         },
     }
+}
+
+/// The measured torque beyond a limit, at every row.
+pub(super) fn beyond(frame: &Frame, limit: f64) -> Vec<f64> {
+    frame.columns.torque.iter().map(|t| t.signum() * (t.abs() - limit).max(0.0)).collect()
 }
 
 fn effect(frame: &Frame, shape: &[f64], c: &[f64]) -> Option<Effect> {

@@ -84,9 +84,10 @@ impl Bench<'_, '_> {
                 moved.push(slope.part);
             }
             moved.dedup();
-            let resistance = match fit.table() {
-                Some(_) => self.resistance_by(&parts, &fit.coefficients),
-                None => self.resistance.clone(),
+            let resistance = if fit.goes_together() {
+                self.resistance_by(&parts, &fit.coefficients)
+            } else {
+                self.resistance.clone()
             };
             for (i, part) in parts.iter_mut().enumerate() {
                 if moved.contains(&i) || moves_otherwise(part, &resistance) {
@@ -116,7 +117,7 @@ impl Bench<'_, '_> {
             part.law.effect(self.frame, &part.shape, c)
         };
         let effects = parts.iter().zip(coefficients).filter(|(part, _)| !part.law.is_simulated()).filter_map(effect);
-        let mut found: Vec<Effect> = effects.filter(Resistance::has).collect();
+        let mut found: Vec<Effect> = effects.filter(Resistance::has_or_delivers).collect();
         // What shakes the table does so behind what was found.
         let shaking: Vec<_> = parts.iter().zip(coefficients).filter(|(part, _)| part.law.is_shaking()).collect();
         if !shaking.is_empty() {
@@ -139,10 +140,11 @@ impl Bench<'_, '_> {
         Some(self.parts_under(start.law, shapes, resistance))
     }
 
-    /// A fit whose table, where one is simulated, moves under what its other causes make of friction and load, and is shaken behind it.
+    /// A fit whose table, where one is simulated, moves under what its other causes make of friction and load, and is shaken behind it;
+    /// and whose torque column, where one is late, is moved as the motor delivers it.
     #[must_use]
     pub fn at_one(&self, fit: Fit) -> Fit {
-        if fit.table().is_none() {
+        if !fit.goes_together() {
             return fit;
         }
         let resistance = self.resistance_of(&fit);

@@ -83,6 +83,15 @@ impl Resistance {
         self.link.as_ref()
     }
 
+    /// From where on the motor of the axis delivers less than its current says, and how much of what that adds.
+    #[must_use]
+    pub fn saturation(&self) -> Option<(f64, f64)> {
+        self.axis.effects.iter().find_map(|effect| match *effect {
+            Effect::TorqueSaturation { limit, slope_ratio } => Some((limit, slope_ratio)),
+            _ => None,
+        })
+    }
+
     /// The same where a cause with these numbers shakes the table.
     #[must_use]
     pub fn shaken_by(mut self, frame: &Frame, law: &Law, shape: &[f64], coefficients: &[f64]) -> Self {
@@ -101,6 +110,12 @@ impl Resistance {
     pub fn with(&self, frame: &Frame, found: Vec<Effect>) -> Self {
         let (shaking, sliding) = (self.shaking.clone(), self.sliding.clone());
         Self { shaking, sliding, ..Self::of(frame, &belief::with_found(&self.axis, frame.axis, found)) }
+    }
+
+    /// Whether an effect is any of it, or what the motor makes of its current.
+    #[must_use]
+    pub fn has_or_delivers(effect: &Effect) -> bool {
+        Self::has(effect) || matches!(effect, Effect::TorqueSaturation { .. })
     }
 
     /// Whether an effect is any of it.
