@@ -1,73 +1,32 @@
 //! The torques of [`Physics`] at places, speeds and times that follow each other closely, as the steps of a simulation do.
 //!
-//! Sines and exponentials are what such a step takes most of its time for, since it waits for them. So each is worked out
-//! ahead, where the next step will be if it goes on as the last did, while that one is made; from there to where it is the first
-//! terms of a series will do, to the last digit but one. Ahead it is a longer series from a place where it is known.
+//! Sines and exponentials are what such a step takes most of its time for, since it waits for them. So each is known at a place,
+//! and a series about that does for many steps, to the last digits; where it no longer reaches, the next place lies ahead.
 
 use super::physics::{Physics, Ripple, Spot, is_gone};
 
-/// Ways up to which the long series are as exact as numbers are: radians of a sine, exponent of an exponential.
-const CLOSE_SINE: f64 = 0.25;
-const CLOSE_FADE: f64 = 0.0625;
-/// The same of the short one.
-const AT_HAND: f64 = 1e-4;
+/// Up to where the series below are as exact as numbers are, to a few roundings: radians of a sine, exponent of an exponential.
+const CLOSE: f64 = 0.1;
+/// How far ahead the next place lies.
+const AHEAD: f64 = 0.95 * CLOSE;
 
 /// 1/n!.
-const WHOLE: [f64; 12] = {
-    let mut terms = [1.0; 12];
+const WHOLE: [f64; 8] = {
+    let mut terms = [1.0; 8];
     let mut n = 1;
-    while n < 12 {
+    while n < 8 {
         terms[n] = terms[n - 1] / n as f64;
         n += 1;
     }
     terms
 };
-/// The series of cosine and of sine over its angle, in squares.
-const EVEN: [f64; 6] = [WHOLE[0], -WHOLE[2], WHOLE[4], -WHOLE[6], WHOLE[8], -WHOLE[10]];
-const ODD: [f64; 6] = [WHOLE[1], -WHOLE[3], WHOLE[5], -WHOLE[7], WHOLE[9], -WHOLE[11]];
-
-/// The first terms of a function's series about where it is looked for next.
-#[derive(Debug, Clone)]
-struct Ahead {
-    last: f64,
-    about: f64,
-    terms: [f64; 4],
-    /// How far the terms reach.
-    reach: f64,
-}
-
-impl Default for Ahead {
-    fn default() -> Self {
-        Self::new(AT_HAND)
-    }
-}
-
-impl Ahead {
-    fn new(reach: f64) -> Self {
-        Self { last: 0.0, about: f64::INFINITY, terms: [0.0; 4], reach }
-    }
-
-    #[inline(always)]
-    fn at(&mut self, x: f64, mut terms_about: impl FnMut(f64) -> [f64; 4]) -> f64 {
-        let d = x - self.about;
-        let value = if d.abs() < self.reach {
-            let [value, slope, bend, twist] = self.terms;
-            (value + d * slope) + d * d * (bend + d * twist)
-        } else {
-            terms_about(x)[0]
-        };
-        self.about = x + (x - self.last);
-        self.last = x;
-        self.terms = terms_about(self.about);
-        value
-    }
-}
 
 /// A ripple near where it is known.
 #[derive(Debug, Clone)]
 struct Wave {
     ripple: Ripple,
     at: f64,
+    /// Its value there, and a quarter of a period on.
     sine: f64,
     cosine: f64,
 }
@@ -77,31 +36,27 @@ impl Wave {
         Self { ripple: *ripple, at: f64::INFINITY, sine: 0.0, cosine: 0.0 }
     }
 
-    /// The terms of its series about a place.
     #[inline(always)]
-    fn terms(&mut self, x: f64) -> [f64; 4] {
-        let Ripple { amplitude, wave, phase } = self.ripple;
-        let mut d = wave * (x - self.at);
-        if !(d.abs() < CLOSE_SINE) {
-            (self.at, [self.sine, self.cosine], d) = (x, known(wave * x + phase), 0.0);
+    fn at(&mut self, x: f64) -> f64 {
+        let mut d = self.ripple.wave * (x - self.at);
+        if !(d.abs() < CLOSE) {
+            d = self.looked_up(x, d);
         }
         let s = d * d;
-        let s2 = s * s;
-        let even = |k: usize| EVEN[k] + EVEN[k + 1] * s;
-        let odd = |k: usize| ODD[k] + ODD[k + 1] * s;
-        let by_cosine = even(0) + s2 * (even(2) + s2 * even(4));
-        let by_sine = d * (odd(0) + s2 * (odd(2) + s2 * odd(4)));
-        let value = amplitude * (self.sine * by_cosine + self.cosine * by_sine);
-        let slope = amplitude * wave * (self.cosine * by_cosine - self.sine * by_sine);
-        let bend = -0.5 * wave * wave;
-        [value, slope, bend * value, bend / 3.0 * slope]
+        let even = (1.0 - WHOLE[2] * s) + s * s * (WHOLE[4] - WHOLE[6] * s);
+        let odd = (1.0 - WHOLE[3] * s) + s * s * (WHOLE[5] - WHOLE[7] * s);
+        self.sine * even + self.cosine * (d * odd)
     }
-}
 
-#[cold]
-fn known(angle: f64) -> [f64; 2] {
-    let (sine, cosine) = angle.sin_cos();
-    [sine, cosine]
+    /// Looks it up ahead of a place, for one that goes on as it came; how far behind the place lies.
+    #[cold]
+    fn looked_up(&mut self, x: f64, d: f64) -> f64 {
+        let Ripple { amplitude, wave, phase } = self.ripple;
+        self.at = x + AHEAD.copysign(d) / wave;
+        let (sine, cosine) = (wave * self.at + phase).sin_cos();
+        (self.sine, self.cosine) = (amplitude * sine, amplitude * cosine);
+        wave * (x - self.at)
+    }
 }
 
 /// e^−x near where it is known.
@@ -120,35 +75,34 @@ impl Default for Fading {
 impl Fading {
     #[inline(always)]
     fn at(&mut self, x: f64) -> f64 {
-        if is_gone(x) { 0.0 } else { self.terms(x)[0] }
-    }
-
-    /// The terms of its series about a place.
-    #[inline(always)]
-    fn terms(&mut self, x: f64) -> [f64; 4] {
+        if is_gone(x) {
+            return 0.0;
+        }
         let mut d = self.at - x;
-        if !(d.abs() < CLOSE_FADE) {
-            (self.at, self.value, d) = (x, faded(x), 0.0);
+        if !(d.abs() < CLOSE) {
+            d = self.looked_up(x, d);
         }
         let s = d * d;
         let pair = |k: usize| WHOLE[k] + WHOLE[k + 1] * d;
-        let value = self.value * (pair(0) + s * (pair(2) + s * (pair(4) + s * (pair(6) + s * WHOLE[8]))));
-        [value, -value, 0.5 * value, -1.0 / 6.0 * value]
+        self.value * ((pair(0) + s * pair(2)) + s * s * (pair(4) + s * pair(6)))
+    }
+
+    /// Looks it up ahead of a place, for one that goes on as it came; how far behind the place lies.
+    #[cold]
+    fn looked_up(&mut self, x: f64, d: f64) -> f64 {
+        self.at = x - AHEAD.copysign(d);
+        self.value = (-self.at).exp();
+        self.at - x
     }
 }
 
-#[cold]
-fn faded(x: f64) -> f64 {
-    (-x).exp()
-}
-
-/// What of an axis's torques is dear, and where it is known. What goes with time alone waits for no step.
+/// What of an axis's torques is dear, and where it is known.
 #[derive(Debug, Clone, Default)]
 pub struct Nearby {
-    cogging: Vec<(Wave, Ahead)>,
+    cogging: Vec<Wave>,
     vibration: Vec<Wave>,
-    spots: Vec<(Spot, Fading, Ahead)>,
-    stribeck: (Fading, Ahead),
+    spots: Vec<(Spot, Fading)>,
+    stribeck: Fading,
     drift: Fading,
 }
 
@@ -156,12 +110,10 @@ impl Nearby {
     /// Nothing is known yet.
     #[must_use]
     pub fn new(physics: &Physics) -> Self {
-        let ahead = |ripple: &Ripple| Ahead::new(AT_HAND / ripple.wave.abs());
-        let spot = |spot: &Spot| (*spot, Fading::default(), Ahead::default());
         Self {
-            cogging: physics.cogging.iter().map(|ripple| (Wave::new(ripple), ahead(ripple))).collect(),
+            cogging: physics.cogging.iter().map(Wave::new).collect(),
             vibration: physics.vibration.iter().map(Wave::new).collect(),
-            spots: physics.spots.iter().map(spot).collect(),
+            spots: physics.spots.iter().map(|spot| (*spot, Fading::default())).collect(),
             ..Self::default()
         }
     }
@@ -169,25 +121,25 @@ impl Nearby {
     /// [`Physics::friction_level`].
     #[inline(always)]
     pub fn friction_level(&mut self, physics: &Physics, x: f64, v: f64, t: f64) -> f64 {
-        let looked_up = |fading: &mut Fading, ahead: &mut Ahead, u: f64| {
-            if is_gone(u) { 0.0 } else { ahead.at(u, |u| fading.terms(u)) }
-        };
-        let ((fading, ahead), drift) = (&mut self.stribeck, &mut self.drift);
-        let with_speed = |u: f64| looked_up(fading, ahead, u);
-        let spots = self.spots.iter_mut().map(|(spot, f, a)| spot.peak * looked_up(f, a, spot.widths(x)));
-        physics.level(v, t, with_speed, spots, |u| drift.at(u))
+        let (stribeck, drift) = (&mut self.stribeck, &mut self.drift);
+        let spots = self.spots.iter_mut().map(|(spot, fading)| spot.peak * fading.at(spot.widths(x)));
+        physics.level(v, t, |u| stribeck.at(u), spots, |u| drift.at(u))
     }
 
     /// [`Physics::load`].
     #[inline(always)]
     pub fn load(&mut self, physics: &Physics, x: f64, v: f64, t: f64) -> f64 {
-        physics.load_with(x, v, self.vibration.iter_mut().map(|wave| wave.terms(t)[0]))
+        physics.load_with(x, v, self.vibration.iter_mut().map(|wave| wave.at(t)))
     }
 
     /// [`Physics::cogging_torque`].
     #[inline(always)]
     pub fn cogging_torque(&mut self, x: f64) -> f64 {
-        self.cogging.iter_mut().map(|(wave, ahead)| ahead.at(x, |x| wave.terms(x))).sum()
+        let mut torque = 0.0;
+        for wave in &mut self.cogging {
+            torque += wave.at(x);
+        }
+        torque
     }
 }
 
