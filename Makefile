@@ -40,8 +40,11 @@ demo: build ## show what gib does
 	@test ! -e c-harness/Makefile || $(MAKE) -s -C c-harness all
 	@GIB=$(RELEASE)/gib tools/demo
 
-test: deps check-format ## everything that must hold
-	@$(MAKE) -s -j2 build rust-tests
+# What links comes first; other packages come while the compiler is at work, and what cargo has built for the tests is what is then shipped.
+test: check-format ## everything that must hold
+	@command -v cc >/dev/null || $(MAKE) -s deps
+	@$(MAKE) -s -j3 deps rust-tests check-lints
+	@$(MAKE) -s build
 	@$(MAKE) -s -j3 test-on-all-cores linuxcnc-test
 	@echo "make test: all passed"
 
@@ -63,13 +66,12 @@ check-lints:
 	@if [ -n "$(CLIPPY)" ]; then $(CARGO) clippy -q --all-targets $(if $(findstring clippy 0.1.95,$(CLIPPY)),-- -D warnings); \
 	else echo "check-lints: skipped, no clippy"; fi
 
-# The compiler is one thread for much of the time: beside the libraries the tests are built.
-rust-tests: check-lints
-	$(CARGO) test --no-run
+rust-tests:
+	$(CARGO) test --profile $(PROFILE) --no-run
 
 # Cargo does not take part in the jobs of make, and rustdoc would warn of them.
 test-rust:
-	GIB_RELEASE=$(RELEASE) MAKEFLAGS= $(CARGO) test
+	GIB_RELEASE=$(RELEASE) MAKEFLAGS= $(CARGO) test --profile $(PROFILE)
 
 test-parquet: ## the feature parquet, which takes minutes to build and is not in `make test`
 	$(CARGO) test --features parquet --lib -- parquet
