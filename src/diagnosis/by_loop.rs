@@ -15,7 +15,7 @@ mod sharper;
 mod trial;
 
 pub(super) use itself::settled;
-pub(super) use replays::{Over, Replays, mean, misses, strength};
+pub(super) use replays::Replays;
 pub(super) use sharper::sharpened;
 
 use super::belief;
@@ -29,6 +29,7 @@ use super::holdout::Holdout;
 use super::judge::{refuted, shows};
 use super::known::Known;
 use super::left::unexplained;
+use super::missed::{GIVES, JUDGES, NOTHING, Over, avoidable, is_much, mean, misses, strength};
 use super::progress::{Stopped, Watch};
 use super::select::LEAST_STRENGTH;
 use super::show;
@@ -37,13 +38,8 @@ use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::observed::Observed;
 use itself::by_torque;
-use replays::{NOTHING, avoidable};
 use trial::{Refined, Trial, starts};
 
-/// A miss that the loop has something to say of: of more than twice what the encoder itself is off by.
-const MUCH: f64 = 0.9;
-/// And in how many blocks of either half: an axis that sticks may break loose another way in a moment or two.
-const FEWEST: usize = 3;
 /// Share of the misses beyond that which a cause must explain in rows that gave none of its numbers.
 const LEAST_EXPLAINED: f64 = 0.4;
 /// The same where the torque is left with much that no cause explains; a clearance or a spring that explains less may lie in another valley
@@ -62,10 +58,6 @@ const RIVAL: f64 = 0.25;
 const HOPE: f64 = 0.25;
 /// Causes that are refined.
 const TRIED: usize = 4;
-/// The halves that give a cause its numbers and that judge it.
-const GIVES: Over = Over::Half(0);
-const JUDGES: Over = Over::Half(1);
-
 const STAGE: &str = "asking the closed loop";
 
 /// An answer with what only the loop tells beside it, where its machine was replayed; `frame` is what the torque is judged on.
@@ -191,13 +183,6 @@ fn answered(
     stays.findings.push(told.finding);
     stays.findings.sort_by(|a, b| b.share.total_cmp(&a.share));
     Ok(Some(Diagnosis { verdict: told.verdict, gains, unexplained, extended, ..stays }))
-}
-
-/// Whether the loop has something to say, by how far each block is missed.
-pub(super) fn is_much(misses: &[f64]) -> bool {
-    let missed =
-        |half: Over| misses.iter().enumerate().filter(|(block, miss)| half.has(*block) && **miss >= MUCH).count();
-    missed(GIVES).min(missed(JUDGES)) >= FEWEST
 }
 
 /// What the loop tells.
@@ -334,11 +319,11 @@ fn promising(
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::replays::BLOCKS;
     use super::*;
     use crate::diagnosis::frame::Columns;
     use crate::diagnosis::gain::HeldOut;
     use crate::diagnosis::left::{Left, Unexplained};
+    use crate::diagnosis::missed::BLOCKS;
     use crate::diagnosis::whole::Whole;
     use crate::machine::Machine;
     use crate::plant::moves::{Moves, Reach};
@@ -467,13 +452,6 @@ pub(super) mod tests {
         let told = told(&[hidden]);
         let [Effect::PreslidingFriction { displacement_um, .. }] = told.as_slice() else { panic!("{told:?}") };
         assert!((displacement_um / 4.0 - 1.0).abs() < 0.1, "{displacement_um}");
-    }
-
-    #[test]
-    fn a_loop_that_rests_most_of_the_time_is_asked_and_one_that_misses_in_moments_is_not() {
-        let missed =
-            |every: usize| (0..BLOCKS).map(|i| if i / 2 % every == 0 { 2.5 } else { NOTHING }).collect::<Vec<_>>();
-        assert!(is_much(&missed(8)) && !is_much(&missed(12)) && !is_much(&[NOTHING; BLOCKS]));
     }
 
     /// A move in each of four blocks, and rests between: what such an axis shows it shows there.

@@ -1,9 +1,9 @@
 //! What the extended machine is worth on rows it was not fitted to, by the prediction that `gib predict` makes.
 
 use super::belief;
-use super::by_loop;
 use super::fit::{Bench, Fit};
 use super::frame::Frame;
+use super::missed::{self, half_of};
 use super::progress::{Stopped, Watch};
 use super::replayed;
 use super::whole::Whole;
@@ -190,7 +190,7 @@ impl<'g, 'f, 'a> HeldOut<'g, 'f, 'a> {
     pub fn missed(&self, errors: &Errors) -> Option<Vec<f64>> {
         let [_, error, position] = self.misses(errors)?;
         let floor = statistics::reading_error(position);
-        (floor > 0.0).then(|| by_loop::misses(error, floor))
+        (floor > 0.0).then(|| missed::misses(error, floor))
     }
 
     /// RMS of the torque while the axis moves, by machines with these sets of causes, in some stretches that all are compared in.
@@ -244,13 +244,6 @@ fn fitted_without(axis: &Axis, bench: &Bench, fit: &Fit, half: usize) -> Axis {
 
 /// Rows of neither half.
 const NEITHER: usize = 2;
-
-/// The half that a block belongs to, by the sequence of Thue and Morse: blocks that alternate might fall in step with moves
-/// that repeat, and each half would lack what the other is judged on.
-#[must_use]
-pub fn half_of(block: usize) -> usize {
-    block.count_ones() as usize % 2
-}
 
 /// For each row the half its block belongs to, 2 for rows before the first and after the last block.
 fn half_of_rows(bench: &Bench, time_s: &[f64]) -> Vec<usize> {

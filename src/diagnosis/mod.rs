@@ -36,6 +36,7 @@ mod left;
 mod low_limit;
 mod many;
 mod means;
+mod missed;
 mod narrow;
 mod play;
 pub mod progress;

@@ -2,9 +2,9 @@
 //! in the same few rows about a reversal, which the low-pass smears alike; a loop that is replayed with the wrong one of them misses the
 //! measured position by more.
 
-use super::by_loop::{Over, strength};
 use super::fit::{Bench, Fit};
 use super::gain::{Errors, HeldOut};
+use super::missed::{Over, strength};
 use super::progress::{Stopped, Watch};
 use super::select::{Selection, is_physical, price};
 use super::verdict::block_t;

@@ -2,9 +2,9 @@
 
 use super::STAGE;
 use crate::analysis::statistics;
-use crate::diagnosis::gain::{Replay, half_of};
+use crate::diagnosis::gain::Replay;
+use crate::diagnosis::missed::{BLOCKS, Over, blocks_of, mean, mean_square, miss_of};
 use crate::diagnosis::progress::Watch;
-use crate::diagnosis::uncertainty::widening;
 use crate::diagnosis::whole::Whole;
 use crate::machine::Axis;
 use crate::plant::added::ByServo;
@@ -14,13 +14,6 @@ use crate::plant::simulate::Sensors;
 use once_cell::sync::OnceCell;
 use std::ops::Range;
 
-/// Contiguous blocks of rows. Each counts alike: where an axis that sticks breaks loose a cycle sooner or later one of them holds more
-/// error than all others.
-pub const BLOCKS: usize = 48;
-/// The miss of a block by no more than the encoder itself is off by.
-pub const NOTHING: f64 = 0.35;
-/// What is hardly missed, over what is missed most.
-const HARDLY: f64 = 0.1;
 /// Most plant steps of a replay: 40 s at the usual ones. Longer steps are no help, they put impacts elsewhere.
 const MOST_STEPS: usize = 1_600_000;
 /// The same where causes are tried that may not be worth it.
@@ -34,22 +27,6 @@ const MOST_OF_ROWS: usize = 4;
 
 /// Noise of a sensor over its grid that readings at rest may hide.
 const FLICKER: f64 = 0.2;
-
-/// Which blocks.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Over {
-    /// One half, or the other.
-    Half(usize),
-    All,
-}
-
-impl Over {
-    /// Whether a block is one of them.
-    #[must_use]
-    pub fn has(self, block: usize) -> bool {
-        self == Over::All || self == Over::Half(half_of(block))
-    }
-}
 
 /// By what a machine misses the measured position, and how far each block is missed whatever the machine.
 type ErrorAndUnavoidable = (Vec<f64>, Vec<f64>);
@@ -170,7 +147,7 @@ impl<'r> Replays<'r> {
         blocks_of(self.part.rows - self.begun).collect()
     }
 
-    /// How far each block is missed, see [`misses`], but for long rests; one that is nothing else by as much as the encoder is off by.
+    /// How far each block is missed, see [`crate::diagnosis::missed::misses`], but for long rests; one that is nothing else by as much as the encoder is off by.
     #[must_use]
     pub fn misses(&self, error: &[f64]) -> Vec<f64> {
         let heard = &self.heard[self.begun..];
@@ -214,44 +191,6 @@ impl<'r> Replays<'r> {
     }
 }
 
-/// Misses beyond those that are unavoidable, a block each.
-#[must_use]
-pub fn avoidable(misses: &[f64], unavoidable: &[f64]) -> Vec<f64> {
-    misses.iter().zip(unavoidable).map(|(miss, by)| miss - by.max(NOTHING)).collect()
-}
-
-/// Mean over some blocks.
-#[must_use]
-pub fn mean(of_blocks: &[f64], over: Over) -> f64 {
-    let blocks = || of_blocks.iter().enumerate().filter(|(block, _)| over.has(*block)).map(|(_, value)| value);
-    blocks().sum::<f64>() / blocks().count().max(1) as f64
-}
-
-/// The same over that half of them which is missed most: an axis that rests or goes on evenly is where it is told to be by any machine.
-#[must_use]
-pub fn mean_of_worse_half(of_blocks: &[f64], over: Over) -> f64 {
-    let blocks = of_blocks.iter().enumerate().filter(|(block, _)| over.has(*block));
-    let mut missed: Vec<f64> = blocks.map(|(_, value)| *value).collect();
-    missed.sort_by(|a, b| b.total_cmp(a));
-    missed.truncate(missed.len().div_ceil(2));
-    missed.iter().sum::<f64>() / missed.len().max(1) as f64
-}
-
-/// Mean over scatter, times √blocks, of the share that is gained of what is missed in each block, over that half of some blocks which was
-/// missed most, but for those that were hardly missed beside the worst: an axis that rests gains nothing by any law. By fewer blocks the
-/// scatter is known less, and it is less by as much as Student's distribution is wider.
-#[must_use]
-pub fn strength(gained: &[f64], misses: &[f64], over: Over) -> f64 {
-    let mut judging: Vec<usize> = (0..BLOCKS).filter(|block| over.has(*block)).collect();
-    judging.sort_by(|a, b| misses[*b].total_cmp(&misses[*a]));
-    judging.truncate(judging.len().div_ceil(2));
-    let beyond = |block: usize| misses[block] - NOTHING;
-    let hardly = HARDLY * judging.first().map_or(0.0, |worst| beyond(*worst));
-    judging.retain(|block| beyond(*block) >= hardly);
-    let share = |&block: &usize| (gained[block] / beyond(block).max(NOTHING)).clamp(-1.0, 1.0);
-    statistics::strength(&judging.iter().map(share).collect::<Vec<_>>()) / widening(judging.len() as f64 - 1.0)
-}
-
 /// Which rows are not of a long rest: where within its friction an axis came to rest is partly chance, and that is not to count over and
 /// over.
 fn rows_but_for_long_rests(observed: &Observed, rows: usize) -> Vec<bool> {
@@ -262,22 +201,4 @@ fn rows_but_for_long_rests(observed: &Observed, rows: usize) -> Vec<bool> {
         (row - since) as f64 * observed.period_s <= LONG_REST_S
     };
     (0..rows).map(is_heard).collect()
-}
-
-fn blocks_of(rows: usize) -> impl Iterator<Item = Range<usize>> {
-    (0..BLOCKS).map(move |block| block * rows / BLOCKS..(block + 1) * rows / BLOCKS)
-}
-
-fn mean_square(error: &[f64]) -> f64 {
-    error.iter().map(|e| e * e).filter(|square| square.is_finite()).sum::<f64>() / error.len().max(1) as f64
-}
-
-/// How far each block of rows is missed: ½·ln(1 + mean square over that of what the encoder itself is off by).
-#[must_use]
-pub fn misses(error: &[f64], floor: f64) -> Vec<f64> {
-    blocks_of(error.len()).map(|rows| miss_of(mean_square(&error[rows]) / floor.powi(2))).collect()
-}
-
-fn miss_of(mean_square: f64) -> f64 {
-    0.5 * mean_square.ln_1p()
 }

@@ -6,15 +6,15 @@
 //! together, and its impact goes as width times inertia. The loop is asked in each about the numbers that were found.
 
 use super::itself::by_torque;
-use super::replays::{NOTHING, Over, Replays, avoidable, mean, mean_of_worse_half, misses, strength};
 use super::trial::{Refined, Trial};
-use super::{ABOUT_REVERSALS, GIVES, JUDGES, STAGE, Told, answered};
+use super::{ABOUT_REVERSALS, Replays, STAGE, Told, answered};
 use crate::analysis::statistics;
 use crate::diagnosis::causes::law;
 use crate::diagnosis::excerpt::Excerpt;
 use crate::diagnosis::frame::Frame;
 use crate::diagnosis::gain;
 use crate::diagnosis::judge::refuted;
+use crate::diagnosis::missed::{GIVES, JUDGES, NOTHING, Over, avoidable, mean, mean_of_worse_half, misses, strength};
 use crate::diagnosis::progress::{Stopped, Watch};
 use crate::diagnosis::verdict::{Diagnosis, Verdict};
 use crate::diagnosis::{belief, verdict::Finding};

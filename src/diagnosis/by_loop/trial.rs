@@ -1,6 +1,6 @@
 //! A cause as it is tried in the loop: a law with numbers of its own, of which some are moved.
 
-use super::replays::{Over, Replays};
+use super::replays::Replays;
 use crate::diagnosis::belief;
 use crate::diagnosis::causes::presliding_friction::{BRISTLE, OF_ANY_EXPONENT, WITHIN_STEPS};
 use crate::diagnosis::causes::table_side::{split, swing_of};
@@ -8,6 +8,7 @@ use crate::diagnosis::causes::{Law, Resistance, Rest, Scale, law};
 use crate::diagnosis::fit::pseudo_inverse;
 use crate::diagnosis::frame::Frame;
 use crate::diagnosis::known::LAW_HOLDS;
+use crate::diagnosis::missed::{Over, mean};
 use crate::diagnosis::uncertainty::{SIMULATED, widening};
 use crate::machine::{Axis, Cause, Effect};
 use nalgebra::{DMatrix, DVector};
@@ -315,7 +316,7 @@ impl Trial {
     #[must_use]
     pub fn refined(self, frame: &Frame, axis: &Axis, replays: &Replays, over: Over, hopeful: f64) -> Option<Refined> {
         let error = |trial: &Self| replays.error(&trial.on(frame, axis)?);
-        let miss = |error: &[f64]| super::replays::mean(&replays.misses(error), over);
+        let miss = |error: &[f64]| mean(&replays.misses(error), over);
         let mut left = error(&self)?;
         let mut trial = self;
         let mut covariance = DMatrix::zeros(0, 0);

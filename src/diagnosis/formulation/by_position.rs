@@ -3,11 +3,11 @@
 //! creeps away and elements return, and its loop comes to rest elsewhere.
 
 use super::{OWN_STEPS, place};
-use crate::diagnosis::by_loop::{Over, is_much, mean, strength};
 use crate::diagnosis::causes::law;
 use crate::diagnosis::causes::presliding_friction::{BRISTLE, ELEMENTS_AS_BRISTLE, OF_ANY_EXPONENT};
 use crate::diagnosis::fit::{Bench, Fit};
 use crate::diagnosis::gain::{Errors, HeldOut};
+use crate::diagnosis::missed::{Over, is_much, mean, strength};
 use crate::diagnosis::progress::{Stopped, Watch};
 use crate::diagnosis::select::is_physical;
 use crate::machine::Cause;
