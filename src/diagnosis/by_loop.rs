@@ -29,7 +29,7 @@ use super::holdout::Holdout;
 use super::judge::{refuted, shows};
 use super::known::Known;
 use super::left::unexplained;
-use super::missed::{GIVES, JUDGES, NOTHING, Over, avoidable, is_much, mean, misses, strength};
+use super::missed::{GIVES, JUDGES, LEAST_EXPLAINED, NOTHING, Over, avoidable, is_much, mean, misses, strength};
 use super::progress::{Stopped, Watch};
 use super::select::LEAST_STRENGTH;
 use super::show;
@@ -40,9 +40,7 @@ use crate::plant::observed::Observed;
 use itself::by_torque;
 use trial::{Refined, Trial, starts};
 
-/// Share of the misses beyond that which a cause must explain in rows that gave none of its numbers.
-const LEAST_EXPLAINED: f64 = 0.4;
-/// The same where the torque is left with much that no cause explains; a clearance or a spring that explains less may lie in another valley
+/// [`LEAST_EXPLAINED`] where the torque is left with much that no cause explains; a clearance or a spring that explains less may lie in another valley
 /// than that to which its start led.
 const MOSTLY: f64 = 0.6;
 /// Mean over scatter of what it gains in each block, times √blocks, as many as there are ([`strength`]).

@@ -308,6 +308,13 @@ impl Part {
         }
     }
 
+    /// Its non-linear parameters with one of them at another value.
+    fn shape_with(&self, index: usize, value: f64) -> Vec<f64> {
+        let mut shape = self.shape.clone();
+        shape[index] = value;
+        shape
+    }
+
     /// Number of its non-linear parameters that are fitted.
     #[must_use]
     pub fn free_parameters(&self) -> usize {

@@ -6,6 +6,7 @@ mod laws;
 
 use super::fit::{Bench, Fit, Part, pseudo_inverse};
 use super::judge::{Excess, LITTLE_LEFT, MOST_OF_A_CURVE, is_coloured};
+use super::known::LAW_HOLDS;
 use super::progress::{Stopped, Watch};
 use super::select::{BELIEF, LEAST_GAIN, NUMBER_PRICE, price};
 use super::shrink::idle_left_out;
@@ -85,8 +86,10 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
         // Several numbers of the belief may well be wrong at once, and need no law without a name for that.
         let guesses = found.parts.iter().filter(|part| !stays(part) && !BELIEF.contains(&part.law.cause)).count();
         let least = if needless > 1 && guesses > 0 { 0.0 } else { FOR_AS_MANY };
-        // Any form also takes what one cause leaves by being not quite the law that the machine follows.
-        let in_place = needless > 1 || needless == 1 && (!law.takes_any_form() || more > MOST_OF_A_CURVE * explained);
+        // In place of one cause, any form also takes what that leaves by being not quite the law that the machine follows, and any law what
+        // none holds to.
+        let most = if law.takes_any_form() { MOST_OF_A_CURVE } else { LAW_HOLDS * LAW_HOLDS };
+        let in_place = needless > 1 || needless == 1 && more > most * explained;
         if in_place && better > least && own > MOST * explained {
             return Ok(Some(law.goes));
         }

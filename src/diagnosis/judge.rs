@@ -154,6 +154,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         }
         let Weighed { gains, in_judged_rows, fails } = weighed;
         if !fails {
+            found.fit = self.bench.within_bounds(found.fit);
             let replay = errors.and_then(|errors| errors.replay);
             return Ok(Judged {
                 verdict,

@@ -15,6 +15,8 @@ const HARDLY: f64 = 0.1;
 const MUCH: f64 = 0.9;
 /// And in how many blocks of either half: an axis that sticks may break loose another way in a moment or two.
 const FEWEST: usize = 3;
+/// Share of the misses beyond what the encoder itself is off by that a cause must explain in rows that gave none of its numbers.
+pub const LEAST_EXPLAINED: f64 = 0.4;
 /// The halves that give a cause its numbers and that judge it.
 pub const GIVES: Over = Over::Half(0);
 pub const JUDGES: Over = Over::Half(1);

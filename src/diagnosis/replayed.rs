@@ -16,6 +16,7 @@ use super::gain::HeldOut;
 use super::judge::Judged;
 use super::many::{add, dot};
 use super::progress::{Stopped, Watch};
+use super::select::LEAST_STRENGTH;
 use super::uncertainty::{self, MOST_IN_A_BLOCK, SIMULATED, Sure, widening};
 use crate::analysis::statistics;
 use crate::machine::Axis;
@@ -110,7 +111,12 @@ pub fn refined(bench: &Bench, held_out: &HeldOut, judged: &Judged, watch: &Watch
     };
     let Some(says) = Says::of(&sides.iter().map(difference).collect::<Vec<_>>()) else { return Ok(None) };
 
+    let missed = |replayed: &[f64]| -> Vec<f64> {
+        let moved = replayed.iter().zip(middle).map(|(there, middle)| there - middle);
+        error(&start.iter().zip(moved).map(|(start, moved)| start + moved).collect::<Vec<f64>>())
+    };
     let (mut at, mut best) = (DVector::zeros(open.count()), None);
+    let as_named = size(&least);
     for trial in 0..MOST_TRIALS {
         let Some(said) = says.together(&least, &at) else { break };
         if said.promised > (1.0 - WORTH[trial.min(1)]) * size(&least) {
@@ -118,22 +124,43 @@ pub fn refined(bench: &Bench, held_out: &HeldOut, judged: &Judged, watch: &Watch
         }
         let Some(there) = replay(&said.place) else { break };
         watch.at(0.97 + 0.01 * trial as f64, STAGE)?;
-        let position: Vec<f64> =
-            start.iter().zip(there.iter().zip(middle)).map(|(start, (there, middle))| start + there - middle).collect();
-        let next = error(&position);
+        let next = missed(&there);
         if size(&next) >= size(&least) {
             break;
         }
         let mut covariance = open.covariance(&said.covariance);
         // Of what a bound stops the position says nothing.
         stopped.iter().for_each(|&i| covariance[(i, i)] = sure.covariance[(i, i)]);
-        best = Some((Numbers::moved(fit, &sure, &open.unknowns_and_turns(&said.place).0), covariance));
+        best = Some((open.unknowns_and_turns(&said.place), covariance));
         (least, at) = (next, said.place);
     }
-    Ok(best.map(|(Numbers { shapes, coefficients }, covariance)| Replayed {
-        fit: bench.with_numbers(fit, &shapes, coefficients),
-        sure: Sure { covariance, ..sure },
-    }))
+    let Some(((by, turned), covariance)) = best else { return Ok(None) };
+    let mut numbers = Numbers::moved(fit, &sure, &by);
+    if let Some(plainer) = with_usual_forms(fit, (&sure, &by), &covariance) {
+        let plainer = Numbers::moved(fit, &sure, &plainer);
+        let there = machine(&plainer).and_then(|machine| replayed(&machine, &turned));
+        if there.is_some_and(|there| size(&missed(&there)) < as_named) {
+            numbers = plainer;
+        }
+    }
+    let Numbers { shapes, coefficients } = numbers;
+    Ok(Some(Replayed { fit: bench.with_numbers(fit, &shapes, coefficients), sure: Sure { covariance, ..sure } }))
+}
+
+/// By how much unknowns move where forms that are not surely others stay as usual; `None` where all are, or there is none.
+fn with_usual_forms(fit: &Fit, (sure, by): (&Sure, &DVector<f64>), covariance: &DMatrix<f64>) -> Option<DVector<f64>> {
+    let first = covariance.nrows() - sure.shapes.len();
+    let (mut plainer, mut rest) = (by.clone(), covariance.clone());
+    for (s, &(part, index)) in sure.shapes.iter().enumerate() {
+        let (k, fit::Part { law, shape, .. }) = (first + s, &fit.parts[part]);
+        let is_open = law.is_as_usual(index, shape[index]) && rest[(k, k)] > 0.0;
+        if is_open && by[k].abs() < LEAST_STRENGTH * covariance[(k, k)].sqrt() {
+            plainer -= rest.column(k) * (plainer[k] / rest[(k, k)]);
+            plainer[k] = 0.0;
+            rest = without(&rest, &[k]);
+        }
+    }
+    (plainer != *by).then_some(plainer)
 }
 
 /// How many rows of a recording are replayed once more: all, or the first where that would take long.

@@ -16,6 +16,7 @@ use super::grids;
 use super::many::{add, dot};
 use crate::machine::{Cause, Effect};
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
 /// How exactly a law holds, as a share of its size: sampling, filter and the law itself are no better.
 const LAW_HOLDS: f64 = 1e-3;
@@ -28,6 +29,10 @@ pub(super) const SIMULATED: f64 = 3.0;
 
 /// Share of an unknown's column that one block may hold: leaving out a block that holds all of it would not move it.
 pub(super) const MOST_IN_A_BLOCK: f64 = 0.5;
+
+/// By how much, as a logarithm, a form that is taken to be as usual may be another one at most (a standard deviation): friction falls with
+/// speed by exponents of 0.5 to 2 and more.
+const ANOTHER_FORM: f64 = 0.7;
 
 /// Unknowns of a fit, as columns of its equations: coefficients of all parts in order, then the non-linear parameters.
 struct Unknowns<'s> {
@@ -57,7 +62,7 @@ impl<'s> Unknowns<'s> {
 pub fn strengths(bench: &Bench, fit: &Fit) -> Vec<f64> {
     let slopes = bench.slopes(fit, 0);
     let Unknowns { columns, coefficient_at, first_slope } = Unknowns::of(fit, &slopes);
-    let spread = Spread::of(bench, fit, &columns);
+    let spread = Spread::of(bench, fit, &columns, &[]);
     let misfit = misfit(bench, fit);
     let alone = |unknown: usize| DVector::from_fn(columns.len(), |i, _| f64::from(u8::from(i == unknown)));
     let of_first = |i: usize, part: &Part| {
@@ -86,18 +91,19 @@ pub fn strengths(bench: &Bench, fit: &Fit) -> Vec<f64> {
 /// The unknowns of a fit and how sure they are.
 #[derive(Debug, Clone)]
 pub struct Sure {
-    /// Part and index of each non-linear parameter; in the order of the unknowns they come after the coefficients of all parts.
+    /// Part and index of each non-linear parameter, forms that are as usual last; in the order of the unknowns they come after the
+    /// coefficients of all parts.
     pub shapes: Vec<(usize, usize)>,
     /// Covariance of all unknowns, non-linear parameters in the units of their scales; as exactly as laws hold.
     pub covariance: DMatrix<f64>,
 }
 
-/// What the blocks say of each unknown of a fit.
+/// What the blocks say of each unknown of a fit, and of each form that is taken to be as usual.
 #[must_use]
 pub fn of_unknowns(bench: &Bench, fit: &Fit) -> Sure {
-    let slopes = bench.slopes(fit, 0);
+    let (slopes, forms) = (bench.slopes(fit, 0), bench.slopes_of_usual_forms(fit));
     let Unknowns { columns, first_slope, .. } = Unknowns::of(fit, &slopes);
-    let spread = Spread::of(bench, fit, &columns);
+    let spread = Spread::of(bench, fit, &columns, &forms);
     let simulated = SIMULATED * misfit(bench, fit);
     let mut widened = Vec::with_capacity(columns.len());
     let mut open = Vec::with_capacity(columns.len());
@@ -119,7 +125,20 @@ pub fn of_unknowns(bench: &Bench, fit: &Fit) -> Sure {
         DMatrix::from_fn(columns.len(), columns.len(), |i, j| widened[i] * widened[j] * spread.covariance(i, j));
     open.iter().enumerate().for_each(|(i, open)| covariance[(i, i)] += open);
     debug_assert_eq!(first_slope + slopes.len(), columns.len());
-    Sure { shapes: slopes.iter().map(|slope| (slope.part, slope.index)).collect(), covariance }
+    let shapes = slopes.iter().chain(&forms).map(|slope| (slope.part, slope.index)).collect();
+    // What stands in for a form goes back as that becomes another one.
+    let known = columns.len();
+    let mut covariance = covariance.resize(known + forms.len(), known + forms.len(), 0.0);
+    for (form, ByForm { stand_in, deviation }) in spread.by_form.iter().enumerate() {
+        let together = stand_in.clone().push(-1.0) * *deviation;
+        let at = |k: usize| if k < known { k } else { known + form };
+        for i in 0..=known {
+            for j in 0..=known {
+                covariance[(at(i), at(j))] += together[i] * together[j];
+            }
+        }
+    }
+    Sure { shapes, covariance }
 }
 
 /// Effects with the standard deviation of each parameter, in the order of the fit's parts; `None` where the parameters
@@ -128,14 +147,18 @@ pub fn of_unknowns(bench: &Bench, fit: &Fit) -> Sure {
 pub fn effects(bench: &Bench, fit: &Fit, sure: Option<&Sure>) -> Vec<Option<(Effect, Vec<f64>)>> {
     let slopes = if sure.is_some() { Vec::new() } else { bench.slopes(fit, 0) };
     let Unknowns { columns, coefficient_at, first_slope } = Unknowns::of(fit, &slopes);
-    let by_blocks = sure.is_none().then(|| (Spread::of(bench, fit, &columns), misfit(bench, fit)));
+    let by_blocks = sure.is_none().then(|| {
+        let forms = bench.slopes_of_usual_forms(fit);
+        (Spread::of(bench, fit, &columns, &forms), misfit(bench, fit))
+    });
     let shapes: Vec<(usize, usize)> =
         sure.map_or_else(|| slopes.iter().map(|slope| (slope.part, slope.index)).collect(), |sure| sure.shapes.clone());
     let unknowns = first_slope + shapes.len();
     let deviation_of = |part: &Part, gradient: &DVector<f64>| match (&by_blocks, sure) {
         (Some((spread, misfit)), _) => {
             let widened = if part.law.is_simulated() { SIMULATED * misfit } else { 1.0 };
-            (widened * spread.deviation(gradient)).hypot(gradient.dot(&spread.by_sampling))
+            let by_sampling = (widened * spread.deviation(gradient)).hypot(gradient.dot(&spread.by_sampling));
+            spread.by_form.iter().fold(by_sampling, |all, by| all.hypot(gradient.dot(&by.stand_in) * by.deviation))
         }
         (None, Some(sure)) => gradient.dot(&(&sure.covariance * gradient)).max(0.0).sqrt(),
         (None, None) => 0.0,
@@ -192,6 +215,11 @@ pub fn effects(bench: &Bench, fit: &Fit, sure: Option<&Sure>) -> Vec<Option<(Eff
                 ends.iter().fold(found, |all, (unknown, range)| all.hypot(gradient[(k, *unknown)] * range))
             };
             let mut deviations: Vec<f64> = (0..values.len()).map(deviation).collect();
+            // A form that stays as usual was not found: others are less sure for it, but it is not said.
+            for (s, _) in own_shapes().filter(|(_, index)| part.law.is_as_usual(*index, part.shape[*index])) {
+                let its = (0..values.len()).filter(|k| gradient[(*k, first_slope + s)] != 0.0);
+                its.for_each(|k| deviations[k] = 0.0);
+            }
             for &(index, off) in part.law.manner.taken {
                 let ends = [off, -off].map(|off| {
                     let mut shape = part.shape.clone();
@@ -204,6 +232,10 @@ pub fn effects(bench: &Bench, fit: &Fit, sure: Option<&Sure>) -> Vec<Option<(Eff
             match (effect, deviations.as_mut_slice()) {
                 (Effect::DeadTime { .. }, [deviation]) => {
                     *deviation = deviation.hypot(1e3 * grids::delay_s(bench.frame));
+                }
+                // Where it begins to saturate is a corner, which the low-pass rounds.
+                (Effect::TorqueSaturation { limit, .. }, [deviation, ..]) => {
+                    *deviation = deviation.hypot(LAW_HOLDS * limit);
                 }
                 (Effect::DriveCompliance { .. }, [.., deviation]) => {
                     *deviation = deviation.hypot(table_side::open_damping(bench.frame, &effect));
@@ -269,13 +301,24 @@ struct Spread {
     /// By how much what nobody knows of the sampling of the torque moves the unknowns: alike in all blocks, which say nothing of it,
     /// and in proportion to what is there, so that it makes nothing of nothing.
     by_sampling: DVector<f64>,
+    /// What is made of each form that is taken to be as usual.
+    by_form: Vec<ByForm>,
+}
+
+/// A form that may be another one.
+struct ByForm {
+    /// By how much the unknowns stand in for it, each per unit of its logarithm.
+    stand_in: DVector<f64>,
+    /// By how much it may be another one (a standard deviation).
+    deviation: f64,
 }
 
 impl Spread {
-    fn of(bench: &Bench, fit: &Fit, columns: &[&[f64]]) -> Spread {
+    fn of(bench: &Bench, fit: &Fit, columns: &[&[f64]], forms: &[Slope]) -> Spread {
         let k = columns.len();
         if k == 0 {
-            return Spread { moves: Vec::new(), shares: Vec::new(), by_sampling: DVector::zeros(0) };
+            let by_sampling = DVector::zeros(0);
+            return Spread { moves: Vec::new(), shares: Vec::new(), by_sampling, by_form: Vec::new() };
         }
         // What every fit leaves free is taken off the columns first.
         let free = fit.basis().len() - fit.coefficients.iter().map(Vec::len).sum::<usize>();
@@ -295,14 +338,26 @@ impl Spread {
         let pseudo = |m: &DMatrix<f64>| pseudo_inverse(m.clone(), 1e-10).unwrap_or_else(|| DMatrix::identity(k, k));
         let inverse = pseudo(&normal);
         let in_units = |moved: &DVector<f64>| DVector::from_fn(k, |i, _| moved[i] / scales[i]);
-        let by_sampling = slope_by_sampling(bench).map_or_else(
-            || DVector::zeros(k),
-            |slope| {
-                let slope = clear(slope);
-                let along = DVector::from_fn(k, |i, _| dot(&cleared[i], &slope) / scales[i]);
-                in_units(&(&inverse * along))
-            },
-        );
+        // By how much the unknowns take a column on themselves, each in the unit of its own.
+        let taken_on = |column: &[f64]| {
+            let along = DVector::from_fn(k, |i, _| dot(&cleared[i], column) / scales[i]);
+            &inverse * along
+        };
+        let by_sampling =
+            slope_by_sampling(bench).map_or_else(|| DVector::zeros(k), |slope| in_units(&taken_on(&clear(slope))));
+        let by_form = |Slope { column, .. }: &Slope| {
+            let mut own = clear(column.clone());
+            let taken = taken_on(&own);
+            cleared.iter().enumerate().for_each(|(i, column)| add(&mut own, -taken[i] / scales[i], column));
+            let square = dot(&own, &own).max(1e-300);
+            // As far as it may be another one: by what is left of the fit, block by block, and by how much that asks for another.
+            let along = |piece: Range<usize>| dot(&own[piece.clone()], &fit.residual[piece]);
+            let blocks = bench.frame.blocks.windows(2).map(|ends| bench.pieces(ends[0]..ends[1]));
+            let by_block: Vec<f64> = blocks.map(|pieces| pieces.into_iter().map(along).sum::<f64>() / square).collect();
+            let (off, spread) = (by_block.iter().sum::<f64>(), by_block.iter().map(|by| by * by).sum::<f64>().sqrt());
+            ByForm { stand_in: in_units(&taken), deviation: off.hypot(spread).min(ANOTHER_FORM) }
+        };
+        let by_form = forms.iter().map(by_form).collect();
         let (mut moves, mut shares) = (Vec::new(), Vec::new());
         for block in blocks::within(bench, &cleared, MOST_IN_A_BLOCK) {
             let pieces = bench.pieces(block);
@@ -315,7 +370,7 @@ impl Spread {
             let share = &inverse * own * &inverse;
             shares.push(DMatrix::from_fn(k, k, |i, j| share[(i, j)] / (scales[i] * scales[j])));
         }
-        Spread { moves, shares, by_sampling }
+        Spread { moves, shares, by_sampling, by_form }
     }
 
     /// Covariance of two unknowns.

@@ -5,6 +5,11 @@ use crate::diagnosis::causes::Scale;
 use rayon::prelude::*;
 use std::sync::Arc;
 
+/// A small step of a logarithm.
+const STEP_OF_LOG: f64 = 0.02;
+/// How often the way to a bound is halved.
+const HALVED: usize = 40;
+
 /// The derivative of the model by one non-linear parameter.
 #[derive(Debug, Clone)]
 pub struct Slope {
@@ -31,6 +36,26 @@ impl Bench<'_, '_> {
     #[must_use]
     pub fn slopes(&self, fit: &Fit, first: usize) -> Vec<Slope> {
         self.slopes_of(fit, first, |_| true)
+    }
+
+    /// The same by each parameter of form that is as usual, and not fitted.
+    #[must_use]
+    pub fn slopes_of_usual_forms(&self, fit: &Fit) -> Vec<Slope> {
+        let mut slopes = Vec::new();
+        for (i, part) in fit.parts.iter().enumerate() {
+            for (index, scale) in part.law.scales.iter().enumerate() {
+                let at = part.shape[index];
+                if !part.law.is_as_usual(index, at) {
+                    continue;
+                }
+                let moved = [scale.moved(at, STEP_OF_LOG), scale.moved(at, -STEP_OF_LOG)];
+                let both = self.parts_like(part, moved.map(|value| part.shape_with(index, value)).into());
+                let Ok([up, down]) = <[Part; 2]>::try_from(both) else { continue };
+                let side = Side { index, apart: scale.distance(moved[1], moved[0]), up, down };
+                slopes.extend(self.slope(i, &fit.coefficients[i], &side));
+            }
+        }
+        slopes
     }
 
     /// The same of those parameters that these rows are to tell.
@@ -140,21 +165,47 @@ impl Bench<'_, '_> {
             let step = match *scale {
                 Scale::Choice => continue,
                 Scale::Form(.., usual) if usual == part.shape[index] => continue,
-                Scale::Log(..) | Scale::Form(..) => 0.02 * steps,
+                Scale::Log(..) | Scale::Form(..) => STEP_OF_LOG * steps,
                 Scale::Linear(_, _, step) => step * steps,
             };
             let at = part.shape[index];
-            let (above, below) = (scale.moved(at, step), scale.moved(at, -step));
-            for value in [above, below] {
-                let mut shape = part.shape.clone();
-                shape[index] = value;
-                shapes.push(shape);
-            }
+            // Beyond where a table has all of the friction nothing changes any more: there the slope is that to one side.
+            let [above, below] = [step, -step]
+                .map(|step| scale.moved(at, step))
+                .map(|value| if self.makes_another(part, index, value) { value } else { at });
+            shapes.extend([above, below].map(|value| part.shape_with(index, value)));
             moves.push((index, scale.distance(below, above)));
         }
         let mut parts = self.parts_like(part, shapes).into_iter();
         let side = |(index, apart): (usize, f64)| Some(Side { index, apart, up: parts.next()?, down: parts.next()? });
         moves.into_iter().map_while(side).collect()
+    }
+
+    /// Whether a part has another effect with one of its parameters at this value; what no simulation shows has.
+    fn makes_another(&self, part: &Part, index: usize, value: f64) -> bool {
+        let effect = |shape: &[f64]| part.law.effect(self.frame, shape, &[]);
+        !part.law.is_simulated() || effect(&part.shape_with(index, value)) != effect(&part.shape)
+    }
+
+    /// The same fit where no parameter of a simulated table stands beyond where it changes something.
+    #[must_use]
+    pub fn within_bounds(&self, mut fit: Fit) -> Fit {
+        let Some(part) = fit.table().map(|at| &mut fit.parts[at]) else { return fit };
+        for (index, scale) in part.law.scales.iter().enumerate() {
+            let at = part.shape[index];
+            let (mut inside, mut beyond) = (scale.moved(at, -scale.farthest()), at);
+            if self.makes_another(part, index, scale.moved(at, STEP_OF_LOG)) || !self.makes_another(part, index, inside)
+            {
+                continue;
+            }
+            for _ in 0..HALVED {
+                let middle = scale.moved(inside, 0.5 * scale.distance(inside, beyond));
+                let end = if self.makes_another(part, index, middle) { &mut inside } else { &mut beyond };
+                *end = middle;
+            }
+            (part.shape[index], part.sides) = (beyond, Arc::default());
+        }
+        fit
     }
 
     /// The slope between two sides of part `i`; `None` where the bounds leave no room.
