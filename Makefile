@@ -40,7 +40,8 @@ demo: build ## show what gib does
 	@test ! -e c-harness/Makefile || $(MAKE) -s -C c-harness all
 	@GIB=$(RELEASE)/gib tools/demo
 
-# What links comes first; other packages come while the compiler is at work, and what cargo has built for the tests is what is then shipped.
+# What links comes first; other packages come while the compiler is at work, and what cargo has built for the tests is what
+# is then shipped.
 test: check-format ## everything that must hold
 	@command -v cc >/dev/null || $(MAKE) -s deps
 	@$(MAKE) -s -j3 deps rust-tests check-lints

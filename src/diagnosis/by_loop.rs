@@ -40,8 +40,8 @@ use crate::plant::observed::Observed;
 use itself::by_torque;
 use trial::{Refined, Trial, starts};
 
-/// [`LEAST_EXPLAINED`] where the torque is left with much that no cause explains; a clearance or a spring that explains less may lie in another valley
-/// than that to which its start led.
+/// [`LEAST_EXPLAINED`] where the torque is left with much that no cause explains; a clearance or a spring that explains less may lie in
+/// another valley than that to which its start led.
 const MOSTLY: f64 = 0.6;
 /// Mean over scatter of what it gains in each block, times √blocks, as many as there are ([`strength`]).
 const SURELY: f64 = 3.0;
@@ -56,6 +56,7 @@ const RIVAL: f64 = 0.25;
 const HOPE: f64 = 0.25;
 /// Causes that are refined.
 const TRIED: usize = 4;
+
 const STAGE: &str = "asking the closed loop";
 
 /// An answer with what only the loop tells beside it, where its machine was replayed; `frame` is what the torque is judged on.

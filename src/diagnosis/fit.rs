@@ -362,8 +362,8 @@ impl Fit {
     /// Whether the trace of one part goes with the numbers of others.
     #[must_use]
     pub fn goes_together(&self) -> bool {
-        let has = |cause| self.parts.iter().any(|part| part.law.cause == cause);
-        self.table().is_some() || has(Cause::DeadTime) && has(Cause::TorqueSaturation)
+        let any = |is: fn(&Law) -> bool| self.parts.iter().any(|part| is(part.law));
+        self.table().is_some() || any(Law::is_delivered) && any(|law| law.cause == Cause::TorqueSaturation)
     }
 
     /// Number of fitted numbers.

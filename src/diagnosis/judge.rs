@@ -154,6 +154,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         }
         let Weighed { gains, in_judged_rows, fails } = weighed;
         if !fails {
+            // On a bound its numbers are as sure as torque and loop have them; beyond it nothing tells them.
             found.fit = self.bench.within_bounds(found.fit);
             let replay = errors.and_then(|errors| errors.replay);
             return Ok(Judged {

@@ -17,8 +17,9 @@ const MUCH: f64 = 0.9;
 const FEWEST: usize = 3;
 /// Share of the misses beyond what the encoder itself is off by that a cause must explain in rows that gave none of its numbers.
 pub const LEAST_EXPLAINED: f64 = 0.4;
-/// The halves that give a cause its numbers and that judge it.
+/// The half that gives a cause its numbers.
 pub const GIVES: Over = Over::Half(0);
+/// The half that judges it.
 pub const JUDGES: Over = Over::Half(1);
 
 /// Which blocks.
@@ -26,6 +27,7 @@ pub const JUDGES: Over = Over::Half(1);
 pub enum Over {
     /// One half, or the other.
     Half(usize),
+    /// Both.
     All,
 }
 

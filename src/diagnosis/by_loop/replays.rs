@@ -147,7 +147,8 @@ impl<'r> Replays<'r> {
         blocks_of(self.part.rows - self.begun).collect()
     }
 
-    /// How far each block is missed, see [`crate::diagnosis::missed::misses`], but for long rests; one that is nothing else by as much as the encoder is off by.
+    /// How far each block is missed, see [`crate::diagnosis::missed::misses`], but for long rests; one that is nothing else by as much as
+    /// the encoder is off by.
     #[must_use]
     pub fn misses(&self, error: &[f64]) -> Vec<f64> {
         let heard = &self.heard[self.begun..];

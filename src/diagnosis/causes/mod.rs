@@ -218,6 +218,12 @@ impl Law {
         matches!(self.terms, Terms::Simulated(_))
     }
 
+    /// Whether the traces go by what the motor makes of its current.
+    #[must_use]
+    pub fn is_delivered(&self) -> bool {
+        matches!(self.terms, Terms::Delivered(_))
+    }
+
     /// Whether the cause shakes the table.
     #[must_use]
     pub fn is_shaking(&self) -> bool {

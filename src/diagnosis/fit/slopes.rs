@@ -41,21 +41,11 @@ impl Bench<'_, '_> {
     /// The same by each parameter of form that is as usual, and not fitted.
     #[must_use]
     pub fn slopes_of_usual_forms(&self, fit: &Fit) -> Vec<Slope> {
-        let mut slopes = Vec::new();
-        for (i, part) in fit.parts.iter().enumerate() {
-            for (index, scale) in part.law.scales.iter().enumerate() {
-                let at = part.shape[index];
-                if !part.law.is_as_usual(index, at) {
-                    continue;
-                }
-                let moved = [scale.moved(at, STEP_OF_LOG), scale.moved(at, -STEP_OF_LOG)];
-                let both = self.parts_like(part, moved.map(|value| part.shape_with(index, value)).into());
-                let Ok([up, down]) = <[Part; 2]>::try_from(both) else { continue };
-                let side = Side { index, apart: scale.distance(moved[1], moved[0]), up, down };
-                slopes.extend(self.slope(i, &fit.coefficients[i], &side));
-            }
-        }
-        slopes
+        let of_part = |(i, part): (usize, &Part)| {
+            let slopes = |side: &Side| self.slope(i, &fit.coefficients[i], side);
+            self.sides_of(part, 1.0, true).iter().filter_map(slopes).collect::<Vec<_>>()
+        };
+        fit.parts.iter().enumerate().flat_map(of_part).collect()
     }
 
     /// The same of those parameters that these rows are to tell.
@@ -159,12 +149,17 @@ impl Bench<'_, '_> {
 
     /// A part with each of its parameters up and down by so many steps, all worked out together.
     pub(super) fn sides(&self, part: &Part, steps: f64) -> Vec<Side> {
+        self.sides_of(part, steps, false)
+    }
+
+    /// The same of the parameters that are fitted, or of those of form that are as usual.
+    fn sides_of(&self, part: &Part, steps: f64, as_usual: bool) -> Vec<Side> {
         let mut shapes = Vec::new();
         let mut moves = Vec::new();
         for (index, scale) in part.law.scales.iter().enumerate() {
             let step = match *scale {
                 Scale::Choice => continue,
-                Scale::Form(.., usual) if usual == part.shape[index] => continue,
+                _ if part.law.is_as_usual(index, part.shape[index]) != as_usual => continue,
                 Scale::Log(..) | Scale::Form(..) => STEP_OF_LOG * steps,
                 Scale::Linear(_, _, step) => step * steps,
             };
@@ -175,6 +170,9 @@ impl Bench<'_, '_> {
                 .map(|value| if self.makes_another(part, index, value) { value } else { at });
             shapes.extend([above, below].map(|value| part.shape_with(index, value)));
             moves.push((index, scale.distance(below, above)));
+        }
+        if shapes.is_empty() {
+            return Vec::new();
         }
         let mut parts = self.parts_like(part, shapes).into_iter();
         let side = |(index, apart): (usize, f64)| Some(Side { index, apart, up: parts.next()?, down: parts.next()? });
