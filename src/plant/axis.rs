@@ -3,14 +3,22 @@
 //! Positions drift half a step at the old speed, forces act at the middle, positions drift the other half at the new speed
 //! (position Verlet: second order, keeps the energy of a spring); dry friction is solved implicitly within the kick and
 //! viscous friction as the mean of old and new speed. The motor's torque follows the servo's exactly:
-//! T(t + h) = u + (T − u)·e^(−h/τ), and a step feels its mean. Steps are as short as flanks need that swing; while they are
-//! calm, they are as long as all else needs.
+//! T(t + h) = u + (T − u)·e^(−h/τ), and a step feels its mean. Steps are as short as flanks need that swing and friction that turns
+//! round; while neither happens, they may be longer.
 
 use super::coupling::{CALM, Leaning, transmitted};
 use super::friction::{Bristle, Elements, Friction};
 use super::nearby::Nearby;
+use super::pace::{Long, Pace};
 use super::physics::Physics;
 use crate::machine::TwoMasses;
+
+/// Share of its speed by which a motion changes in a step that goes on.
+const STEADY: f64 = 0.1;
+/// Share of its level from which on friction that builds up slips.
+const SLIPS: f64 = 0.99999;
+/// Share of the way over which it builds up that a mass at rest goes in a step.
+const RESTS: f64 = 3e-4;
 
 /// An axis's body, in the motor's coordinate.
 #[derive(Debug, Clone)]
@@ -18,10 +26,12 @@ pub struct Body {
     laws: Laws,
     time_constant_s: f64,
     pace: Pace,
-    /// Longest step while flanks are calm, s; `None` where they are never told to be.
-    calm_step_s: Option<f64>,
-    /// Whether they were in the last steps.
+    /// Longer steps, where there are any.
+    long: Option<Long>,
+    /// Whether flanks were calm in the last steps.
     calm: bool,
+    /// The last step, s.
+    last_step_s: f64,
     plain: bool,
     /// Of motor and table.
     held: [Held; 2],
@@ -36,20 +46,15 @@ struct Laws {
     viscous: f64,
 }
 
-/// A plant step.
-#[derive(Debug, Clone, Copy)]
-struct Pace {
-    step_s: f64,
-    /// Rest and mean over a step of a first-order lag.
-    lag: (f64, f64),
-}
-
-impl Pace {
-    fn new(step_s: f64, time_constant_s: f64) -> Self {
-        let ratio = step_s / time_constant_s;
-        let lag = if time_constant_s > 0.0 { ((-ratio).exp(), -(-ratio).exp_m1() / ratio) } else { (0.0, 0.0) };
-        Self { step_s, lag }
-    }
+/// How friction acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Acts {
+    /// It slips, or holds a mass where it is: where it turns round it jumps.
+    Dry,
+    /// Over a way.
+    BuildsUp,
+    /// It would build up, but hardly anything moves.
+    Holds,
 }
 
 /// What no register can hold of a mass.
@@ -87,6 +92,8 @@ struct Mass {
     share: f64,
     position: f64,
     velocity: f64,
+    /// By how much the speed changed in the last step.
+    change: f64,
     bristle: Bristle,
 }
 
@@ -97,8 +104,22 @@ impl Mass {
         let half = 0.5 * h * self.share * viscous;
         let impulse = (self.inertia - half) * self.velocity + h * torque;
         let (mass, level) = (self.inertia + half, self.share * level);
-        self.velocity = self.bristle.step(elements.as_mut(), mass, impulse, h, self.velocity, level);
-        self.position = middle + 0.5 * h * self.velocity;
+        let velocity = self.bristle.step(elements.as_mut(), mass, impulse, h, self.velocity, level);
+        self.change = velocity - self.velocity;
+        self.velocity = velocity;
+        self.position = middle + 0.5 * h * velocity;
+    }
+
+    /// Whether it stays at rest or slides on at about its speed.
+    #[inline(always)]
+    fn goes_on(&self) -> bool {
+        self.change.abs() <= STEADY * self.velocity.abs().min((self.velocity - self.change).abs())
+    }
+
+    /// Speed at the middle of a step, if it changes as it did in the last one.
+    #[inline(always)]
+    fn middle_speed(&self) -> f64 {
+        self.velocity + 0.5 * self.change
     }
 
     /// Position after the first half of the drift.
@@ -109,19 +130,19 @@ impl Mass {
 }
 
 impl Body {
-    /// A body at a position and speed (motor's coordinate), its motor's current at `torque`. Its steps are of `step_s`, and no longer
-    /// than `longest_s` where nothing swings.
+    /// A body at a position and speed (motor's coordinate), its motor's current at `torque`. Its steps are of `step_s`; where
+    /// flanks are calm they are no longer than `usual_s`, where nothing is sudden no longer than `longest_s`.
     #[must_use]
     pub fn new(
         physics: Physics,
-        [step_s, longest_s]: [f64; 2],
+        [step_s, usual_s, longest_s]: [f64; 3],
         time_constant_s: f64,
         [position, velocity]: [f64; 2],
         torque: f64,
     ) -> Body {
         let mass = |inertia: f64, share: f64| {
             let Friction { bristle, .. } = physics.bristle(share);
-            Mass { inertia, share, position, velocity, bristle }
+            Mass { inertia, share, position, velocity, change: 0.0, bristle }
         };
         let (motor, table) = match &physics.two_masses {
             None => (mass(physics.inertia, 1.0), mass(physics.inertia, 0.0)),
@@ -135,63 +156,146 @@ impl Body {
                 (mass(masses.motor_inertia, 1.0 - share), table)
             }
         };
-        let flanks = physics.two_masses.filter(|masses| masses.clearance > 0.0);
+        let pace = Pace::new(step_s, time_constant_s);
         let bodies = [&motor, &table].map(|mass| (mass.inertia, mass.share));
-        let calm_step_s = flanks.map(|masses| longest_s.min(physics.longest_calm_step_s(&masses, &bodies)));
+        let long = Long::new(&physics, [usual_s, longest_s], &bodies, pace);
         let plain = physics.is_plain();
         let load_per_motor = 1.0 / physics.motor_per_load;
         let viscous = physics.slope_at(1.0);
         let held = [(); 2].map(|()| Held { near: Nearby::new(&physics), elements: physics.bristle(1.0).elements });
         let state = State { time_s: 0.0, torque, motor, table };
-        let pace = Pace::new(step_s, time_constant_s);
-        let calm_step_s = calm_step_s.filter(|calm| *calm > step_s);
         let laws = Laws { physics, load_per_motor, viscous };
-        Body { laws, time_constant_s, pace, calm_step_s, calm: false, plain, held, state }
+        let calm = laws.flanks().is_none();
+        Body { laws, time_constant_s, pace, long, calm, last_step_s: step_s, plain, held, state }
     }
 
     /// Advances by `steps` plant steps while the servo asks for `asked`.
     pub fn advance(&mut self, asked: f64, steps: usize) {
-        let Some(calm_step_s) = self.calm_step_s else { return self.step::<false>(asked, steps, self.pace) };
-        let span = steps as f64 * self.pace.step_s;
-        let few = (span / calm_step_s).ceil() as usize;
-        if self.calm && few < steps {
-            let (before, elements) = (self.state, [0, 1].map(|of| self.held[of].elements));
-            self.step::<true>(asked, few, Pace::new(span / few as f64, self.time_constant_s));
-            if self.calm {
+        if steps == 0 {
+            return;
+        }
+        if self.long.is_none() {
+            self.step::<false, false>(asked, steps, self.pace);
+            return;
+        }
+        let friction = self.friction();
+        if let Some(few) = self.fewer(asked, steps, friction) {
+            // What slips or stays where it is is none of the elements' doing.
+            let elements = (friction != Acts::Dry).then(|| [0, 1].map(|of| self.held[of].elements));
+            let before = self.state;
+            let pace = self.pace_of(few, steps);
+            self.slips(friction == Acts::Dry);
+            let goes_on = self.step::<true, true>(asked, few, pace);
+            self.slips(false);
+            let as_smooth = match friction {
+                Acts::Dry => goes_on,
+                Acts::BuildsUp => true,
+                Acts::Holds => self.friction() == Acts::Holds,
+            };
+            if self.calm && as_smooth {
                 return;
             }
             self.state = before;
-            self.held.iter_mut().zip(elements).for_each(|(held, before)| held.elements = before);
+            self.held.iter_mut().zip(elements.into_iter().flatten()).for_each(|(held, before)| held.elements = before);
         }
-        self.step::<true>(asked, steps, self.pace);
+        self.step::<true, false>(asked, steps, self.pace);
     }
 
-    /// Steps at a pace; `FLANKS` says whether it is to be known if they are calm.
-    fn step<const FLANKS: bool>(&mut self, asked: f64, steps: usize, pace: Pace) {
+    /// How friction acts on the masses.
+    fn friction(&mut self) -> Acts {
+        let Body { laws: Laws { physics: p, load_per_motor, .. }, held, state, long, .. } = self;
+        let long_s = long.map_or(0.0, |long| long.longest_s[0]);
+        let (mut builds_up, mut holds) = (false, true);
+        for (mass, held) in [&state.motor, &state.table].into_iter().zip(held) {
+            let stiffness = mass.bristle.stiffness;
+            if stiffness == 0.0 {
+                holds &= mass.share == 0.0;
+                continue;
+            }
+            let (x, v) = (mass.position * *load_per_motor, mass.velocity * *load_per_motor);
+            let level = mass.share * held.near.friction_level(p, x, v, state.time_s);
+            let rests = long_s * mass.velocity.abs() * stiffness <= RESTS * level;
+            builds_up |= mass.bristle.force.abs() < SLIPS * level;
+            holds &= rests;
+        }
+        if holds {
+            Acts::Holds
+        } else if builds_up {
+            Acts::BuildsUp
+        } else {
+            Acts::Dry
+        }
+    }
+
+    /// Lets bristles slip, or no longer.
+    fn slips(&mut self, slips: bool) {
+        self.state.motor.bristle.slips = slips;
+        self.state.table.bristle.slips = slips;
+    }
+
+    /// In how many steps the same may be done, if in fewer.
+    fn fewer(&self, asked: f64, steps: usize, friction: Acts) -> Option<usize> {
+        let long = self.long.as_ref().filter(|_| self.calm)?;
+        let physics = &self.laws.physics;
+        let span = steps as f64 * self.pace.step_s;
+        let of_way = span * self.state.motor.velocity.abs() / long.way;
+        let few = (span / long.longest_s[usize::from(friction == Acts::BuildsUp)]).max(of_way).ceil() as usize;
+        (few < steps && physics.saturates(asked) == physics.saturates(self.state.torque)).then_some(few)
+    }
+
+    /// The pace of fewer steps.
+    fn pace_of(&mut self, few: usize, steps: usize) -> Pace {
+        let step_s = steps as f64 * self.pace.step_s / few as f64;
+        match &mut self.long {
+            Some(Long { last, .. }) if last.step_s == step_s => *last,
+            Some(Long { last, .. }) => {
+                *last = Pace::new(step_s, self.time_constant_s);
+                *last
+            }
+            None => Pace::new(step_s, self.time_constant_s),
+        }
+    }
+
+    /// Steps at a pace. `WATCHED`: whether flanks are calm is to be known. `LONG`: they are longer than usual, and it is told whether all
+    /// masses went on as they did.
+    fn step<const WATCHED: bool, const LONG: bool>(&mut self, asked: f64, steps: usize, pace: Pace) -> bool {
         let mut state = self.state;
+        let by = pace.step_s / self.last_step_s;
+        state.motor.change *= by;
+        state.table.change *= by;
+        self.last_step_s = pace.step_s;
         let (laws, own) = (&self.laws, &mut self.held);
-        let mut leaning = Leaning::default();
+        let (mut leaning, mut goes_on) = (Leaning::default(), true);
+        let mut seen = |carried: Carried, state: &State| {
+            if WATCHED {
+                leaning.add(carried.torque, carried.rate, carried.speeds);
+            }
+            goes_on &= !LONG || state.motor.goes_on() && state.table.goes_on();
+        };
         match (&laws.physics.two_masses, self.plain) {
-            (None, true) => (0..steps).for_each(|_| laws.rigid_step::<true>(pace, own, &mut state, asked)),
-            (None, false) => (0..steps).for_each(|_| laws.rigid_step::<false>(pace, own, &mut state, asked)),
-            (Some(m), true) => (0..steps).for_each(|_| {
-                let carried = laws.two_mass_step::<true>(m, pace, own, &mut state, asked);
-                if FLANKS {
-                    leaning.add(carried.torque, carried.rate, carried.speeds);
-                }
+            (None, true) => (0..steps).for_each(|_| {
+                laws.rigid_step::<true, LONG>(pace, own, &mut state, asked);
+                goes_on &= !LONG || state.motor.goes_on();
             }),
-            (Some(m), false) => (0..steps).for_each(|_| {
-                let carried = laws.two_mass_step::<false>(m, pace, own, &mut state, asked);
-                if FLANKS {
-                    leaning.add(carried.torque, carried.rate, carried.speeds);
-                }
+            (None, false) => (0..steps).for_each(|_| {
+                laws.rigid_step::<false, LONG>(pace, own, &mut state, asked);
+                goes_on &= !LONG || state.motor.goes_on();
             }),
+            (Some(m), true) => {
+                (0..steps)
+                    .for_each(|_| seen(laws.two_mass_step::<true, LONG>(m, pace, own, &mut state, asked), &state));
+            }
+            (Some(m), false) => {
+                (0..steps)
+                    .for_each(|_| seen(laws.two_mass_step::<false, LONG>(m, pace, own, &mut state, asked), &state));
+            }
         }
         self.state = state;
-        if let Some(masses) = self.laws.physics.two_masses.filter(|_| FLANKS && steps > 0) {
+        if let Some(masses) = self.laws.flanks().filter(|_| WATCHED && steps > 0) {
             let both = masses.motor_inertia + masses.table_inertia;
-            self.calm = leaning.is_calm(CALM, &masses, masses.motor_inertia * masses.table_inertia / both);
+            self.calm = leaning.is_calm(CALM, masses, masses.motor_inertia * masses.table_inertia / both);
         }
+        goes_on
     }
 
     /// Motor position, motor's coordinate.
@@ -220,6 +324,11 @@ impl Body {
 }
 
 impl Laws {
+    /// What is between motor and table, where that is a clearance.
+    fn flanks(&self) -> Option<&TwoMasses> {
+        self.physics.two_masses.as_ref().filter(|masses| masses.clearance > 0.0)
+    }
+
     /// Mean torque of the motor over a step.
     #[inline(always)]
     fn motor_torque(pace: Pace, state: &mut State, asked: f64) -> f64 {
@@ -229,24 +338,32 @@ impl Laws {
     }
 
     #[inline(always)]
-    fn rigid_step<const PLAIN: bool>(&self, pace: Pace, [own, _]: &mut [Held; 2], state: &mut State, asked: f64) {
+    fn rigid_step<const PLAIN: bool, const LONG: bool>(
+        &self,
+        pace: Pace,
+        [own, _]: &mut [Held; 2],
+        state: &mut State,
+        asked: f64,
+    ) {
         let (h, p) = (pace.step_s, &self.physics);
+        let excess = state.torque - asked;
         let torque = Self::motor_torque(pace, state, asked);
-        let m = &mut state.motor;
+        let (m, middle_s) = (&mut state.motor, state.time_s + 0.5 * h);
         let middle = m.middle(h);
         if PLAIN {
             m.kick(&mut own.elements, h, middle, torque - p.constant_torque(), self.viscous, p.coulomb());
         } else {
-            let (x, v, t) = (middle * self.load_per_motor, m.velocity * self.load_per_motor, state.time_s);
-            let torque = p.delivered(torque) - own.near.load(p, x, v, t) - own.near.cogging_torque(x);
-            let level = own.near.friction_level(p, x, v, t);
-            m.kick(&mut own.elements, h, middle, torque, p.slope_at(m.velocity), level);
+            let torque = p.delivered(torque) - own.near.cogging_torque(middle * self.load_per_motor);
+            self.resisted::<LONG, true>(m, own, [h, middle_s], middle, torque);
+        }
+        if LONG && m.velocity != 0.0 {
+            m.position += excess * pace.lag_way / m.inertia;
         }
         state.time_s += h;
     }
 
     #[inline(always)]
-    fn two_mass_step<const PLAIN: bool>(
+    fn two_mass_step<const PLAIN: bool, const LONG: bool>(
         &self,
         masses: &TwoMasses,
         pace: Pace,
@@ -255,26 +372,55 @@ impl Laws {
         asked: f64,
     ) -> Carried {
         let (h, p) = (pace.step_s, &self.physics);
+        let excess = state.torque - asked;
         let torque = Self::motor_torque(pace, state, asked);
         let (motor, table) = (&mut state.motor, &mut state.table);
         let (motor_middle, table_middle) = (motor.middle(h), table.middle(h));
         let (rate, speed) = (motor.velocity - table.velocity, table.velocity);
-        let push = transmitted(masses, motor_middle - table_middle, rate);
+        // A spring goes on as it did; flanks may just have met.
+        let changes = if masses.clearance == 0.0 { 0.5 * (motor.change - table.change) } else { 0.0 };
+        let push = transmitted(masses, motor_middle - table_middle, rate + changes);
         if PLAIN {
             let level = p.coulomb();
             motor.kick(&mut at_motor.elements, h, motor_middle, torque - push, self.viscous, level);
             table.kick(&mut at_table.elements, h, table_middle, push - p.constant_torque(), self.viscous, level);
         } else {
-            let t = state.time_s;
-            let (x, v) = (motor_middle * self.load_per_motor, motor.velocity * self.load_per_motor);
-            let torque = p.delivered(torque) - at_motor.near.cogging_torque(x);
-            let level = at_motor.near.friction_level(p, x, v, t);
-            motor.kick(&mut at_motor.elements, h, motor_middle, torque - push, p.slope_at(motor.velocity), level);
-            let (x, v) = (table_middle * self.load_per_motor, table.velocity * self.load_per_motor);
-            let (load, level) = (at_table.near.load(p, x, v, t), at_table.near.friction_level(p, x, v, t));
-            table.kick(&mut at_table.elements, h, table_middle, push - load, p.slope_at(table.velocity), level);
+            let times = [h, state.time_s + 0.5 * h];
+            let torque = p.delivered(torque) - at_motor.near.cogging_torque(motor_middle * self.load_per_motor);
+            self.resisted::<LONG, false>(motor, at_motor, times, motor_middle, torque - push);
+            self.resisted::<LONG, true>(table, at_table, times, table_middle, push);
+        }
+        if LONG && motor.velocity != 0.0 {
+            motor.position += excess * pace.lag_way / motor.inertia;
         }
         state.time_s += h;
         Carried { torque: push, rate, speeds: [speed, table.velocity] }
+    }
+
+    /// Kicks a mass against what resists it at the middle of a step; `LOADED` where the load acts on it.
+    #[inline(always)]
+    fn resisted<const LONG: bool, const LOADED: bool>(
+        &self,
+        mass: &mut Mass,
+        own: &mut Held,
+        [h, middle_s]: [f64; 2],
+        middle: f64,
+        torque: f64,
+    ) {
+        let (p, x, slope) = (&self.physics, middle * self.load_per_motor, self.physics.slope_at(mass.velocity));
+        let at_speed = |own: &mut Held, w: f64| {
+            let v = w * self.load_per_motor;
+            let load = if LOADED { own.near.load(p, x, v, middle_s) } else { 0.0 };
+            (torque - load, own.near.friction_level(p, x, v, middle_s))
+        };
+        let mut speed = mass.middle_speed();
+        if LONG && p.goes_with_speed() {
+            let (torque, level) = at_speed(own, speed);
+            let mut there = *mass;
+            there.kick(&mut None, h, middle, torque, slope, level);
+            speed = 0.5 * (mass.velocity + there.velocity);
+        }
+        let (torque, level) = at_speed(own, speed);
+        mass.kick(&mut own.elements, h, middle, torque, slope, level);
     }
 }

@@ -1,6 +1,6 @@
 //! The table behind a motor that moves as measured: simulated behind its spring or clearance.
 
-use super::coupling::{CALM_BEHIND_MEASURED, Giving, Leaning, longest_step_s, transmitted};
+use super::coupling::{CALM_BEHIND_MEASURED, Giving, LONGER, Leaning, longest_step_s, transmitted};
 use super::friction::Friction;
 use super::nearby::Nearby;
 use super::observed::Observed;
@@ -62,7 +62,8 @@ impl<'o> Table<'o> {
         let friction = physics.bristle(masses.table_friction_share);
         let now = Now { place: motor - lag, speed, friction, recoil: [0.0; 3] };
         let body = (masses.table_inertia, masses.table_friction_share);
-        let longest_s = [longest_step_s(&masses, masses.table_inertia), physics.longest_calm_step_s(&masses, &[body])];
+        let usual_s = longest_step_s(&masses, masses.table_inertia);
+        let longest_s = [usual_s, physics.longest_step_of_bristles_s(&[body]).min(LONGER * usual_s)];
         Self { physics, masses, observed, near: Nearby::new(physics), now, longest_s, goes_along: false }
     }
 

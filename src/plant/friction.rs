@@ -43,6 +43,8 @@ pub struct Bristle {
     pub micro_damping_s: f64,
     /// Torque of the bristle now, without its damping.
     pub force: f64,
+    /// Whether it is strained as far as it goes, and slips like dry friction without one.
+    pub slips: bool,
 }
 
 impl Bristle {
@@ -62,6 +64,11 @@ impl Bristle {
             // A mass is the same in most steps, and a product is ready before a quotient.
             return left.copysign(impulse) * (1.0 / mass);
         }
+        if self.slips {
+            let left = impulse.abs() - h * level - self.micro_damping_s * (level - self.force.abs());
+            self.force = level.copysign(impulse);
+            return left.max(0.0).copysign(impulse) / mass;
+        }
         if level <= 0.0 {
             self.force = 0.0;
             return impulse / mass;
@@ -79,9 +86,17 @@ impl Bristle {
         }
         // F′ = (F + σ·h·v′)·L/d, with the bristle slipping at the speed before the step; its damping adds τ·(F′ − F)/h.
         let (d, late) = (level + self.stiffness * h * v.abs(), h + self.micro_damping_s);
-        let impulse = impulse + self.micro_damping_s * self.force;
-        let next = (impulse * d - late * self.force * level) / (mass * d + self.stiffness * h * late * level);
-        self.force = (self.force + self.stiffness * h * next) * level / d;
+        let with_damping = impulse + self.micro_damping_s * self.force;
+        next = (with_damping * d - late * self.force * level) / (mass * d + self.stiffness * h * late * level);
+        let force = (self.force + self.stiffness * h * next) * level / d;
+        if force.abs() > level.max(self.force.abs()) {
+            // Where it grows faster the speed before the step would strain it beyond its end.
+            let end = level.copysign(force);
+            let slipping = (with_damping - late * end) / mass;
+            self.force = end;
+            return slipping;
+        }
+        self.force = force;
         next
     }
 }
@@ -92,7 +107,10 @@ impl Friction {
     pub fn new(stiffness: f64, law: BristleLaw) -> Self {
         let BristleLaw { exponent, of_elements, micro_damping_s } = law;
         let elements = of_elements.then(|| Elements::new(exponent));
-        Self { bristle: Bristle { stiffness, curve: Curve::new(exponent), micro_damping_s, force: 0.0 }, elements }
+        Self {
+            bristle: Bristle { stiffness, curve: Curve::new(exponent), micro_damping_s, force: 0.0, slips: false },
+            elements,
+        }
     }
 
     /// A bristle at rest; with a stiffness of zero pure Coulomb friction.

@@ -17,6 +17,7 @@ pub mod moves;
 mod nearby;
 pub mod noise;
 pub mod observed;
+mod pace;
 pub mod physics;
 pub mod predict;
 pub mod servo;

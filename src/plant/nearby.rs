@@ -1,9 +1,9 @@
 //! The torques of [`Physics`] at places, speeds and times that follow each other closely, as the steps of a simulation do.
 //!
-//! Sines and exponentials are what such a step takes most of its time for, since it waits for them. So each is known at a place,
+//! Sines, powers and exponentials are what such a step takes most of its time for, since it waits for them. So each is known at a place,
 //! and a series about that does for many steps, to the last digits; where it no longer reaches, the next place lies ahead.
 
-use super::physics::{Physics, Ripple, Spot, is_gone};
+use super::physics::{GONE, Physics, Ripple, Spot};
 
 /// Up to where the series below are as exact as numbers are, to a few roundings: radians of a sine, exponent of an exponential.
 const CLOSE: f64 = 0.1;
@@ -59,25 +59,64 @@ impl Wave {
     }
 }
 
-/// e^−x near where it is known.
+/// A power of a number near where it is known.
+#[derive(Debug, Clone, Default)]
+struct Power {
+    /// One over where it is known, and the power there.
+    per_place: f64,
+    value: f64,
+}
+
+/// Share of a number up to which the series of its power is as exact.
+const CLOSE_TO_POWER: f64 = 0.02;
+/// 1/k; a product is ready before a quotient.
+const PER: [f64; 8] = [f64::INFINITY, 1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0, 1.0 / 6.0, 1.0 / 7.0];
+
+impl Power {
+    #[inline(always)]
+    fn at(&mut self, x: f64, n: f64) -> f64 {
+        if n == 1.0 {
+            return x;
+        }
+        let d = x * self.per_place - 1.0;
+        if !(d.abs() < CLOSE_TO_POWER) {
+            return self.looked_up(x, n);
+        }
+        let term = |k: usize| d * PER[k] * (n + 1.0 - k as f64);
+        let last = 1.0 + term(5) * (1.0 + term(6) * (1.0 + term(7)));
+        self.value * (1.0 + term(1) * (1.0 + term(2) * (1.0 + term(3) * (1.0 + term(4) * last))))
+    }
+
+    #[cold]
+    fn looked_up(&mut self, x: f64, n: f64) -> f64 {
+        self.per_place = 1.0 / x;
+        self.value = x.powf(n);
+        self.value
+    }
+}
+
+/// e^−xⁿ near where it is known.
 #[derive(Debug, Clone)]
 struct Fading {
+    n: f64,
+    /// From where on nothing is left of it.
+    gone: f64,
+    power: Power,
     at: f64,
     value: f64,
 }
 
-impl Default for Fading {
-    fn default() -> Self {
-        Self { at: f64::INFINITY, value: 0.0 }
-    }
-}
-
 impl Fading {
+    fn new(n: f64) -> Self {
+        Self { n, gone: GONE.powf(1.0 / n), power: Power::default(), at: f64::INFINITY, value: 0.0 }
+    }
+
     #[inline(always)]
     fn at(&mut self, x: f64) -> f64 {
-        if is_gone(x) {
+        if !(x < self.gone) {
             return 0.0;
         }
+        let x = self.power.at(x, self.n);
         let mut d = self.at - x;
         if !(d.abs() < CLOSE) {
             d = self.looked_up(x, d);
@@ -97,7 +136,7 @@ impl Fading {
 }
 
 /// What of an axis's torques is dear, and where it is known.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Nearby {
     cogging: Vec<Wave>,
     vibration: Vec<Wave>,
@@ -113,8 +152,9 @@ impl Nearby {
         Self {
             cogging: physics.cogging.iter().map(Wave::new).collect(),
             vibration: physics.vibration.iter().map(Wave::new).collect(),
-            spots: physics.spots.iter().map(|spot| (*spot, Fading::default())).collect(),
-            ..Self::default()
+            spots: physics.spots.iter().map(|spot| (*spot, Fading::new(spot.half_steepness))).collect(),
+            stribeck: Fading::new(physics.half_exponent_of_speed()),
+            drift: Fading::new(1.0),
         }
     }
 
@@ -122,8 +162,8 @@ impl Nearby {
     #[inline(always)]
     pub fn friction_level(&mut self, physics: &Physics, x: f64, v: f64, t: f64) -> f64 {
         let (stribeck, drift) = (&mut self.stribeck, &mut self.drift);
-        let spots = self.spots.iter_mut().map(|(spot, fading)| spot.peak * fading.at(spot.widths(x)));
-        physics.level(v, t, |u| stribeck.at(u), spots, |u| drift.at(u))
+        let spots = self.spots.iter_mut().map(|(spot, fading)| spot.peak * fading.at(spot.square(x)));
+        physics.level(v, t, |square, _| stribeck.at(square), spots, |time| drift.at(time))
     }
 
     /// [`Physics::load`].
@@ -155,6 +195,7 @@ mod tests {
             "coulomb_friction_nm":0.5,"viscous_friction_nm_s":0.01,"constant_torque_nm":0.2,"effects":[
             {"cause":"stribeck_friction","parameters":{"stribeck_torque_nm":0.3,"stribeck_velocity_mm_s":5}},
             {"cause":"position_dependent_friction","parameters":{"centre_mm":100,"peak_nm":0.3,"width_mm":7}},
+            {"cause":"position_dependent_friction","parameters":{"centre_mm":40,"peak_nm":0.3,"width_mm":9,"steepness":6}},
             {"cause":"thermal_drift","parameters":{"drop_nm":0.3,"time_constant_s":20}},
             {"cause":"cable_force","parameters":{"slope_nm_mm":0.001}},
             {"cause":"quadratic_drag","parameters":{"drag_nm_s2_m2":2}},

@@ -6,16 +6,12 @@
 //! (J, ω, torques) are in the drive's own unit, x and v in load units (mm, mm/s; degrees on a rotary axis), t in s from
 //! the recording's first row.
 
-use super::coupling::{LONGER, longest_step_s};
 use super::friction::{BristleLaw, Friction};
 use crate::machine::{Axis, Effect, TwoMasses};
 use std::f64::consts::TAU;
 
 /// Least share of the current beyond a motor's limit that must be delivered for the current to be told from the torque.
 pub const LEAST_SLOPE: f64 = 0.02;
-
-/// Radians of a swing on bristles to a step, which damps it by half as much.
-const BRISTLE_RAD: f64 = 1.0 / 120.0;
 
 /// A sine in position or time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,9 +37,9 @@ impl Ripple {
 pub(super) struct Spot {
     centre: f64,
     pub(super) peak: f64,
-    per_width: f64,
+    pub(super) per_width: f64,
     /// Half of the exponent of the distance.
-    half_steepness: f64,
+    pub(super) half_steepness: f64,
 }
 
 /// Friction that differs at low speed.
@@ -56,37 +52,29 @@ struct Stribeck {
 }
 
 impl Stribeck {
-    /// The power of how many of its speeds a speed is.
+    /// The square of how many of its speeds a speed is.
     #[inline(always)]
-    fn velocities(&self, v: f64) -> f64 {
-        power((v * self.per_velocity).powi(2), self.half_exponent)
+    fn square(&self, v: f64) -> f64 {
+        (v * self.per_velocity).powi(2)
     }
-}
-
-/// A power, which is dear, of a number that most often is to stay as it is.
-#[inline(always)]
-fn power(x: f64, exponent: f64) -> f64 {
-    if exponent == 1.0 { x } else { x.powf(exponent) }
 }
 
 impl Spot {
-    /// The power of how many widths a place is from its centre.
+    /// The square of how many widths a place is from its centre.
     #[inline(always)]
-    pub(super) fn widths(&self, x: f64) -> f64 {
-        power(((x - self.centre) * self.per_width).powi(2), self.half_steepness)
+    pub(super) fn square(&self, x: f64) -> f64 {
+        ((x - self.centre) * self.per_width).powi(2)
     }
 }
 
-/// Whether e^−x is less than a rounding of what it is added to; it is dear.
-#[inline(always)]
-pub(super) fn is_gone(x: f64) -> bool {
-    !(x < 40.0)
-}
+/// From here on e^−x is less than a rounding of what it is added to; it is dear.
+pub(super) const GONE: f64 = 40.0;
 
-/// e^−x, where it is not gone.
+/// e^−xⁿ, where it is not gone.
 #[inline]
-fn fading(x: f64) -> f64 {
-    if is_gone(x) { 0.0 } else { (-x).exp() }
+fn fading(x: f64, n: f64) -> f64 {
+    let power = if n == 1.0 { x } else { x.powf(n) };
+    if power < GONE { (-power).exp() } else { 0.0 }
 }
 
 /// The numbers of an axis, ready for evaluation.
@@ -101,7 +89,7 @@ pub struct Physics {
     /// Bristle displacement at full Coulomb friction in the motor's coordinate, where friction builds over a displacement.
     pub presliding: Option<f64>,
     /// By what law.
-    bristle_law: BristleLaw,
+    pub(super) bristle_law: BristleLaw,
     /// How late the torque column is, s.
     pub delay_s: f64,
     /// Torque ripple over the motor's position, in the order of the effects.
@@ -207,8 +195,8 @@ impl Physics {
     #[must_use]
     #[inline]
     pub fn friction_level(&self, x: f64, v: f64, t: f64) -> f64 {
-        let spots = self.spots.iter().map(|spot| spot.peak * fading(spot.widths(x)));
-        self.level(v, t, fading, spots, fading)
+        let spots = self.spots.iter().map(|spot| spot.peak * fading(spot.square(x), spot.half_steepness));
+        self.level(v, t, fading, spots, |t| fading(t, 1.0))
     }
 
     /// That level at many places and speeds, and the time of each; `fade` makes e^−squareⁿ of squares, n being half of an exponent, as exactly as its
@@ -245,13 +233,13 @@ impl Physics {
         &self,
         v: f64,
         t: f64,
-        with_speed: impl FnOnce(f64) -> f64,
+        with_speed: impl FnOnce(f64, f64) -> f64,
         spots: impl Iterator<Item = f64>,
         with_time: impl FnOnce(f64) -> f64,
     ) -> f64 {
         let mut level = self.coulomb;
         if let Some(stribeck) = &self.stribeck {
-            level += stribeck.torque * with_speed(stribeck.velocities(v));
+            level += stribeck.torque * with_speed(stribeck.square(v), stribeck.half_exponent);
         }
         for spot in spots {
             level += spot;
@@ -274,17 +262,6 @@ impl Physics {
     #[must_use]
     pub fn bristle(&self, share: f64) -> Friction {
         Friction::new(share * self.bristle_stiffness().unwrap_or(0.0), self.bristle_law)
-    }
-
-    /// Longest step of bodies of these inertias and shares of the friction while the flanks between them are calm, s: friction that builds up
-    /// over a way has a swing of its own.
-    #[must_use]
-    pub fn longest_calm_step_s(&self, masses: &TwoMasses, bodies: &[(f64, f64)]) -> f64 {
-        let lightest = bodies.iter().map(|(inertia, _)| *inertia).fold(f64::MAX, f64::min);
-        let stiffness = self.bristle_stiffness().unwrap_or(0.0);
-        let square = bodies.iter().map(|(inertia, share)| share * stiffness / inertia).fold(0.0, f64::max);
-        let bristles = BRISTLE_RAD / square.sqrt().max(square * self.bristle_law.micro_damping_s);
-        bristles.min(LONGER * longest_step_s(masses, lightest))
     }
 
     /// Friction that grows with speed; `w` in the motor's coordinate.
@@ -360,6 +337,23 @@ impl Physics {
             Some((limit, slope)) if torque.abs() > limit => torque.signum() * (limit + slope * (torque.abs() - limit)),
             _ => torque,
         }
+    }
+
+    /// Half of the exponent of the speed by which friction differs where it is low.
+    pub(super) fn half_exponent_of_speed(&self) -> f64 {
+        self.stribeck.map_or(1.0, |stribeck| stribeck.half_exponent)
+    }
+
+    /// Whether anything goes with the speed in another way than in proportion.
+    #[must_use]
+    pub fn goes_with_speed(&self) -> bool {
+        self.stribeck.is_some() || self.drag != 0.0
+    }
+
+    /// Whether a torque is beyond the limit that the motor delivers in full, and to which side.
+    #[must_use]
+    pub fn saturates(&self, torque: f64) -> Option<bool> {
+        self.saturation.filter(|(limit, _)| torque.abs() > *limit).map(|_| torque > 0.0)
     }
 
     /// What the current says when the motor delivers `torque`; a motor that delivers nothing beyond its limit cannot say

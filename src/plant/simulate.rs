@@ -48,6 +48,8 @@ pub struct Start {
 pub struct Setup {
     /// Longest plant step, s; a servo cycle is divided into whole steps, and a stiff drive makes them finer where it swings.
     pub step_s: f64,
+    /// Longest one where nothing is sudden: a motion that slides on or rests, flanks that do not swing. Shorter than the others: none.
+    pub smooth_step_s: f64,
     /// How many times longer the steps are than either asks for; of a spring's no more than twice.
     pub coarser: f64,
     /// Sensors.
@@ -64,6 +66,7 @@ impl Default for Setup {
     fn default() -> Setup {
         Setup {
             step_s: 25e-6,
+            smooth_step_s: 0.0,
             coarser: 1.0,
             sensors: Sensors::default(),
             seed: 0,
@@ -156,7 +159,8 @@ pub fn simulate_cycles(
     let mut log = TorqueLog::new(servo, physics.delay_s, start.torque);
     let table = physics.clone();
     let (position, velocity) = (start.position * scale, start.velocity * scale);
-    let steps_s = [step_s, setup.coarser * setup.step_s];
+    let usual_s = setup.coarser * setup.step_s;
+    let steps_s = [step_s, usual_s, usual_s.max(setup.smooth_step_s)];
     let mut body = Body::new(physics, steps_s, servo.torque_time_constant_s, [position, velocity], start.torque);
     let mut control = ServoLoop::new(servo, axis.base.torque_limit, position, velocity, start.torque);
 
@@ -237,7 +241,8 @@ impl Encoder {
     }
 
     fn read(&self, x: f64, noise: &mut Noise) -> f64 {
-        self.digitise(x * self.scale + self.eccentricity.at(x), noise)
+        let off = if self.eccentricity.amplitude == 0.0 { 0.0 } else { self.eccentricity.at(x) };
+        self.digitise(x * self.scale + off, noise)
     }
 
     fn digitise(&self, x: f64, noise: &mut Noise) -> f64 {
