@@ -408,19 +408,15 @@ impl Laws {
         torque: f64,
     ) {
         let (p, x, slope) = (&self.physics, middle * self.load_per_motor, self.physics.slope_at(mass.velocity));
-        let at_speed = |own: &mut Held, w: f64| {
-            let v = w * self.load_per_motor;
-            let load = if LOADED { own.near.load(p, x, v, middle_s) } else { 0.0 };
-            (torque - load, own.near.friction_level(p, x, v, middle_s))
-        };
-        let mut speed = mass.middle_speed();
-        if LONG && p.goes_with_speed() {
-            let (torque, level) = at_speed(own, speed);
+        let mut v = mass.middle_speed() * self.load_per_motor;
+        if LONG && p.bends(v, mass.change * self.load_per_motor) {
+            let torque = if LOADED { torque - own.near.load(p, x, v, middle_s) } else { torque };
             let mut there = *mass;
-            there.kick(&mut None, h, middle, torque, slope, level);
-            speed = 0.5 * (mass.velocity + there.velocity);
+            there.kick(&mut None, h, middle, torque, slope, own.near.friction_level(p, x, v, middle_s));
+            v = 0.5 * (mass.velocity + there.velocity) * self.load_per_motor;
         }
-        let (torque, level) = at_speed(own, speed);
+        let torque = if LOADED { torque - own.near.load(p, x, v, middle_s) } else { torque };
+        let level = own.near.friction_level(p, x, v, middle_s);
         mass.kick(&mut own.elements, h, middle, torque, slope, level);
     }
 }

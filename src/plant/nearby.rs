@@ -162,14 +162,21 @@ impl Nearby {
     #[inline(always)]
     pub fn friction_level(&mut self, physics: &Physics, x: f64, v: f64, t: f64) -> f64 {
         let (stribeck, drift) = (&mut self.stribeck, &mut self.drift);
-        let spots = self.spots.iter_mut().map(|(spot, fading)| spot.peak * fading.at(spot.square(x)));
+        let mut spots = 0.0;
+        for (spot, fading) in &mut self.spots {
+            spots += spot.peak * fading.at(spot.square(x));
+        }
         physics.level(v, t, |square, _| stribeck.at(square), spots, |time| drift.at(time))
     }
 
     /// [`Physics::load`].
     #[inline(always)]
     pub fn load(&mut self, physics: &Physics, x: f64, v: f64, t: f64) -> f64 {
-        physics.load_with(x, v, self.vibration.iter_mut().map(|wave| wave.at(t)))
+        let mut torque = physics.still_load(x, v);
+        for wave in &mut self.vibration {
+            torque += wave.at(t);
+        }
+        torque
     }
 
     /// [`Physics::cogging_torque`].

@@ -13,6 +13,10 @@ use std::f64::consts::TAU;
 /// Least share of the current beyond a motor's limit that must be delivered for the current to be told from the torque.
 pub const LEAST_SLOPE: f64 = 0.02;
 
+/// Change of a speed in a step, in those at which friction differs, that bends its friction; and from where on hardly any is left to differ.
+const LEAST_BEND: f64 = 0.01;
+const STRAIGHT: f64 = 10.0;
+
 /// A sine in position or time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ripple {
@@ -195,7 +199,7 @@ impl Physics {
     #[must_use]
     #[inline]
     pub fn friction_level(&self, x: f64, v: f64, t: f64) -> f64 {
-        let spots = self.spots.iter().map(|spot| spot.peak * fading(spot.square(x), spot.half_steepness));
+        let spots = self.spots.iter().map(|spot| spot.peak * fading(spot.square(x), spot.half_steepness)).sum();
         self.level(v, t, fading, spots, |t| fading(t, 1.0))
     }
 
@@ -234,15 +238,12 @@ impl Physics {
         v: f64,
         t: f64,
         with_speed: impl FnOnce(f64, f64) -> f64,
-        spots: impl Iterator<Item = f64>,
+        spots: f64,
         with_time: impl FnOnce(f64) -> f64,
     ) -> f64 {
-        let mut level = self.coulomb;
+        let mut level = self.coulomb + spots;
         if let Some(stribeck) = &self.stribeck {
             level += stribeck.torque * with_speed(stribeck.square(v), stribeck.half_exponent);
-        }
-        for spot in spots {
-            level += spot;
         }
         if let Some((drop, per_time, left)) = self.drift {
             level += drop * with_time(t * per_time) - left;
@@ -295,21 +296,18 @@ impl Physics {
     #[must_use]
     #[inline]
     pub fn load(&self, x: f64, v: f64, t: f64) -> f64 {
-        self.load_with(x, v, self.vibration.iter().map(|ripple| ripple.at(t)))
+        self.still_load(x, v) + self.vibration.iter().map(|ripple| ripple.at(t)).sum::<f64>()
     }
 
-    /// That torque by what the vibrations are.
+    /// That torque without vibration.
     #[inline(always)]
-    pub(super) fn load_with(&self, x: f64, v: f64, vibration: impl Iterator<Item = f64>) -> f64 {
+    pub(super) fn still_load(&self, x: f64, v: f64) -> f64 {
         let mut torque = self.constant;
         if self.drag != 0.0 {
             torque += self.drag * v * v.abs();
         }
         if let Some((slope, zero)) = self.cable {
             torque += slope * (x - zero);
-        }
-        for shaken in vibration {
-            torque += shaken;
         }
         torque
     }
@@ -344,10 +342,12 @@ impl Physics {
         self.stribeck.map_or(1.0, |stribeck| stribeck.half_exponent)
     }
 
-    /// Whether anything goes with the speed in another way than in proportion.
-    #[must_use]
-    pub fn goes_with_speed(&self) -> bool {
-        self.stribeck.is_some() || self.drag != 0.0
+    /// Whether friction differs at a speed that changes so much in a step from what it is at the middle; load units.
+    #[inline(always)]
+    pub(super) fn bends(&self, v: f64, change: f64) -> bool {
+        self.stribeck.is_some_and(|Stribeck { per_velocity, .. }| {
+            (change * per_velocity).abs() > LEAST_BEND && (v * per_velocity).abs() < STRAIGHT
+        })
     }
 
     /// Whether a torque is beyond the limit that the motor delivers in full, and to which side.
