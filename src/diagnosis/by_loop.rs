@@ -290,19 +290,31 @@ fn promising(
         let (trial, error) = trial.clone().sized(frame, extended, replays, &before, GIVES)?;
         Some((missed(&error), trial))
     })?;
-    let mut sized: Vec<(f64, Trial)> = sized.into_iter().flatten().collect();
-    sized.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut near: Vec<(f64, Trial)> = Vec::new();
-    for (missed, trial) in sized {
-        // A clearance whose numbers are not yet right shows nothing, and may be all the same.
-        let tried = near.len() < TRIED || trial.law.cause == Cause::Backlash;
-        if tried && near.iter().all(|(_, other)| !std::ptr::eq(other.law, trial.law)) {
-            near.push((missed, trial));
+    let mut sized: Vec<(f64, bool, Trial)> =
+        sized.into_iter().flatten().map(|(missed, trial)| (missed, !trial.linear, trial)).collect();
+    // What acts in proportion has only promised so far, and is asked to show it where that would be among the best.
+    let mut near = loop {
+        sized.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut near: Vec<usize> = Vec::new();
+        for (at, (.., trial)) in sized.iter().enumerate() {
+            // A clearance whose numbers are not yet right shows nothing, and may be all the same.
+            let tried = near.len() < TRIED || trial.law.cause == Cause::Backlash;
+            if tried && near.iter().all(|other| !std::ptr::eq(sized[*other].2.law, trial.law)) {
+                near.push(at);
+            }
         }
-    }
+        let promises: Vec<usize> = near.iter().copied().filter(|at| !sized[*at].1).collect();
+        if promises.is_empty() {
+            break near.into_iter().map(|at| (sized[at].0, sized[at].2.clone())).collect::<Vec<(f64, Trial)>>();
+        }
+        let shown = watch.each(&promises, (0.98, 0.985), STAGE, |&at| sized[at].2.error(frame, extended, replays))?;
+        for (at, error) in promises.into_iter().zip(shown) {
+            (sized[at].0, sized[at].1) = (error.map_or(f64::INFINITY, |error| missed(&error)), true);
+        }
+    };
     let siblings: Vec<Trial> = near.iter().flat_map(|(_, trial)| trial.siblings()).collect();
-    let missed = watch
-        .each(&siblings, (0.985, 0.99), STAGE, |trial| Some(missed(&replays.error(&trial.on(frame, extended)?)?)))?;
+    let missed =
+        watch.each(&siblings, (0.985, 0.99), STAGE, |trial| Some(missed(&trial.error(frame, extended, replays)?)))?;
     for (sibling, missed) in siblings.into_iter().zip(missed) {
         let own = near.iter_mut().find(|(_, own)| std::ptr::eq(own.law, sibling.law));
         if let Some((own, missed)) = own.zip(missed).filter(|(own, missed)| missed < &own.0) {

@@ -55,9 +55,10 @@ pub struct Trial {
     pub law: &'static Law,
     shape: Vec<f64>,
     coefficients: Vec<f64>,
-    /// Whether the first coefficient is open, and whether the position goes with it in proportion.
+    /// Whether the first coefficient is open.
     open: bool,
-    linear: bool,
+    /// Whether the position goes with it in proportion.
+    pub linear: bool,
 }
 
 /// A number that is moved.
@@ -281,7 +282,8 @@ impl Trial {
         moved
     }
 
-    /// The best of its size beside a machine that misses by `before`, and the error there.
+    /// The best of its size beside a machine that misses by `before`, and the error there; of what acts in proportion to a number that is
+    /// only as it would be if the position went with it as well.
     #[must_use]
     pub fn sized(
         self,
@@ -291,8 +293,7 @@ impl Trial {
         before: &[f64],
         over: Over,
     ) -> Option<(Self, Vec<f64>)> {
-        let error = |trial: &Self| replays.error(&trial.on(frame, axis)?);
-        let there = error(&self)?;
+        let there = self.error(frame, axis, replays)?;
         if !self.linear {
             return Some((self, there));
         }
@@ -307,15 +308,22 @@ impl Trial {
         }
         let size = if square > 0.0 { along / square } else { return None };
         let trial = Self { coefficients: vec![size * self.coefficients[0]], ..self };
-        let error = error(&trial)?;
-        Some((trial, error))
+        trial.effect(frame)?;
+        let promised = before.iter().zip(&there).map(|(before, there)| before - size * (before - there)).collect();
+        Some((trial, promised))
+    }
+
+    /// By what an axis with it misses the measured position.
+    #[must_use]
+    pub fn error(&self, frame: &Frame, axis: &Axis, replays: &Replays) -> Option<Vec<f64>> {
+        replays.error(&self.on(frame, axis)?)
     }
 
     /// Moves its numbers to where some blocks are missed least (Gauss–Newton, each block by its own weight). Some steps must have brought the
     /// misses below `hopeful`, or it is left where it is.
     #[must_use]
     pub fn refined(self, frame: &Frame, axis: &Axis, replays: &Replays, over: Over, hopeful: f64) -> Option<Refined> {
-        let error = |trial: &Self| replays.error(&trial.on(frame, axis)?);
+        let error = |trial: &Self| trial.error(frame, axis, replays);
         let miss = |error: &[f64]| mean(&replays.misses(error), over);
         let mut left = error(&self)?;
         let mut trial = self;
