@@ -234,7 +234,7 @@ fn longer_steps_are_none_the_worse() {
         let error = |setup: Setup| 1000.0 * rms(at(setup).iter().zip(&exact).map(|(a, b)| a - b));
         let (usual, long) = (error(Setup::default()), error(Setup { smooth_step_s: 500e-6, ..Setup::default() }));
         println!("{effects:?}: 25 µs {usual:.5} µm, longer {long:.5} µm");
-        assert!(long < 1.1 * usual.max(0.01), "{effects:?}: {long} µm, {usual} µm");
+        assert!(long < 1.2 * usual.max(0.01), "{effects:?}: {long} µm, {usual} µm");
     }
 }
 

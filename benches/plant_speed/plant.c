@@ -50,9 +50,9 @@ static double rigid(long cycles) {
 }
 
 /* One step of a mass on its share of LuGre friction (no micro-damping), implicit in the bristle. */
-static double kick(double inertia, double share, double w, double torque, double level, double stiffness, double *force) {
+static double kick(double inertia, double share, double w, double change, double torque, double level, double stiffness, double *force) {
     double half = 0.5 * H * share * TV, mass = inertia + half, b = (inertia - half) * w + H * torque;
-    double d = level + stiffness * H * fabs(w);
+    double d = level + stiffness * H * fabs(w + change);
     double next = (b * d - H * *force * level) / (mass * d + stiffness * H * H * level);
     *force = (*force + stiffness * H * next) * level / d;
     return next;
@@ -63,7 +63,7 @@ static double two_masses(long cycles) {
     const double f = PI2 * 60.0, k = 30.0 * 1e-6 / (per_um * per_um), gap = 20.0 * per_um;
     const double jt = 0.5 * J * (1.0 - sqrt(1.0 - 4.0 * k / (J * f * f))), jm = J - jt, damping = 2.0 * 0.05 * k / f;
     const double ts = 0.3, vs = 4.0, stiffness = 0.5 * TC / (8.0 * per_um);
-    double qm = 0, wm = 0, qt = 0, wt = 0, fm = 0, ft = 0, torque = 0, read = 0;
+    double qm = 0, wm = 0, qt = 0, wt = 0, fm = 0, ft = 0, torque = 0, read = 0, cm = 0, ct = 0;
     servo s = {0, 0};
     for (long c = 0; c < cycles; c++) {
         long before = c > 0 ? c - 1 : 0, after = c + 1 < cycles ? c + 1 : cycles - 1;
@@ -80,10 +80,11 @@ static double two_masses(long cycles) {
                 push = k * beyond + damping * out;
                 push = push > 0 ? copysign(push, wind) : 0;
             }
-            double rm = wm / scale / vs, rt = wt / scale / vs;
+            double rm = (wm + 0.5 * cm) / scale / vs, rt = (wt + 0.5 * ct) / scale / vs; /* at the middle of the step */
             double lm = 0.5 * (TC + ts * exp(-rm * rm)), lt = 0.5 * (TC + ts * exp(-rt * rt));
-            double nm = kick(jm, 0.5, wm, acting - push, lm, stiffness, &fm);
-            double nt = kick(jt, 0.5, wt, push, lt, stiffness, &ft);
+            double nm = kick(jm, 0.5, wm, cm, acting - push, lm, stiffness, &fm);
+            double nt = kick(jt, 0.5, wt, ct, push, lt, stiffness, &ft);
+            cm = nm - wm; ct = nt - wt;
             qm = mm + 0.5 * H * nm; wm = nm;
             qt = mt + 0.5 * H * nt; wt = nt;
         }

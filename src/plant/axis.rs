@@ -104,7 +104,8 @@ impl Mass {
         let half = 0.5 * h * self.share * viscous;
         let impulse = (self.inertia - half) * self.velocity + h * torque;
         let (mass, level) = (self.inertia + half, self.share * level);
-        let velocity = self.bristle.step(elements.as_mut(), mass, impulse, h, self.velocity, level);
+        let expected = self.velocity + self.change;
+        let velocity = self.bristle.step(elements.as_mut(), mass, impulse, h, expected, level);
         self.change = velocity - self.velocity;
         self.velocity = velocity;
         self.position = middle + 0.5 * h * velocity;
@@ -215,7 +216,8 @@ impl Body {
             let (x, v) = (mass.position * *load_per_motor, mass.velocity * *load_per_motor);
             let level = mass.share * held.near.friction_level(p, x, v, state.time_s);
             let rests = long_s * mass.velocity.abs() * stiffness <= RESTS * level;
-            builds_up |= mass.bristle.force.abs() < SLIPS * level;
+            // It follows a level that goes with the speed a way later.
+            builds_up |= mass.bristle.force.abs() < SLIPS * level || p.bends(v, f64::INFINITY);
             holds &= rests;
         }
         if holds {

@@ -84,19 +84,13 @@ impl Bristle {
             (self.curve, self.force, next) = self.curve.stepped(strained, mass, impulse, h, level);
             return next;
         }
-        // F′ = (F + σ·h·v′)·L/d, with the bristle slipping at the speed before the step; its damping adds τ·(F′ − F)/h.
+        // F′ = (F + σ·h·v′)·L/d, with the bristle slipping at the speed that is expected; its damping adds τ·(F′ − F)/h.
         let (d, late) = (level + self.stiffness * h * v.abs(), h + self.micro_damping_s);
-        let with_damping = impulse + self.micro_damping_s * self.force;
-        next = (with_damping * d - late * self.force * level) / (mass * d + self.stiffness * h * late * level);
-        let force = (self.force + self.stiffness * h * next) * level / d;
-        if force.abs() > level.max(self.force.abs()) {
-            // Where it grows faster the speed before the step would strain it beyond its end.
-            let end = level.copysign(force);
-            let slipping = (with_damping - late * end) / mass;
-            self.force = end;
-            return slipping;
-        }
-        self.force = force;
+        // Does not wait for the next speed, as the quotient of both would.
+        let left = level / d;
+        let impulse = impulse + self.micro_damping_s * self.force;
+        next = (impulse * d - late * self.force * level) / (mass * d + self.stiffness * h * late * level);
+        self.force = (self.force + self.stiffness * h * next) * left;
         next
     }
 }
@@ -125,7 +119,7 @@ impl Friction {
         self.elements.is_none() && self.bristle.curve.exponent == 1.0
     }
 
-    /// Speed after a step of `h` seconds, from the speed `v` before it.
+    /// Speed after a step of `h` seconds, of which `v` is about what is expected.
     ///
     /// `mass`·v′ = `impulse` − h·F with |F| up to `level`; mass and impulse hold all else that acts.
     #[inline(always)]
