@@ -9,6 +9,7 @@
 //! vocabulary, and none explains what it makes.
 
 mod changed;
+mod equations;
 mod itself;
 mod replays;
 mod sharper;
@@ -291,7 +292,7 @@ fn promising(
         Some((missed(&error), trial))
     })?;
     let mut sized: Vec<(f64, bool, Trial)> =
-        sized.into_iter().flatten().map(|(missed, trial)| (missed, !trial.linear, trial)).collect();
+        sized.into_iter().flatten().map(|(missed, trial)| (missed, !trial.promises(), trial)).collect();
     // What acts in proportion has only promised so far, and is asked to show it where that would be among the best.
     let mut near = loop {
         sized.sort_by(|a, b| a.0.total_cmp(&b.0));

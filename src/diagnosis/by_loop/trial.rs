@@ -1,15 +1,14 @@
 //! A cause as it is tried in the loop: a law with numbers of its own, of which some are moved.
 
+use super::equations::Equations;
 use super::replays::Replays;
 use crate::diagnosis::belief;
 use crate::diagnosis::causes::presliding_friction::{BRISTLE, OF_ANY_EXPONENT, WITHIN_STEPS};
 use crate::diagnosis::causes::table_side::{split, swing_of};
 use crate::diagnosis::causes::{Law, Resistance, Rest, Scale, law};
-use crate::diagnosis::fit::pseudo_inverse;
 use crate::diagnosis::frame::Frame;
 use crate::diagnosis::known::LAW_HOLDS;
 use crate::diagnosis::missed::{Over, mean};
-use crate::diagnosis::uncertainty::{SIMULATED, widening};
 use crate::machine::{Axis, Cause, Effect};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -45,8 +44,6 @@ const TWICE: f64 = 2.0;
 const FEW_ROWS: f64 = 0.1;
 /// Steps of the encoder within which friction may build up and not be known to.
 const WITHIN: [f64; 3] = [0.2, 0.5, 1.2];
-/// Share of a block that stays where it alone knows of something.
-const MOST_LEFT_OUT: f64 = 0.95;
 
 /// A law with numbers.
 #[derive(Debug, Clone)]
@@ -58,7 +55,7 @@ pub struct Trial {
     /// Whether the first coefficient is open.
     open: bool,
     /// Whether the position goes with it in proportion.
-    pub linear: bool,
+    linear: bool,
 }
 
 /// A number that is moved.
@@ -308,9 +305,19 @@ impl Trial {
         }
         let size = if square > 0.0 { along / square } else { return None };
         let trial = Self { coefficients: vec![size * self.coefficients[0]], ..self };
+        if !trial.promises() {
+            let error = trial.error(frame, axis, replays)?;
+            return Some((trial, error));
+        }
         trial.effect(frame)?;
         let promised = before.iter().zip(&there).map(|(before, there)| before - size * (before - there)).collect();
         Some((trial, promised))
+    }
+
+    /// Whether [`Trial::sized`] tells no more than what it would be in proportion. An axis that creeps is not so easily foretold.
+    #[must_use]
+    pub fn promises(&self) -> bool {
+        self.linear && self.law.cause != Cause::StribeckFriction
     }
 
     /// By what an axis with it misses the measured position.
@@ -393,60 +400,6 @@ impl Refined {
         let deviations = (0..values.len()).map(deviation).collect();
         Some((effect, deviations))
     }
-}
-
-/// Normal equations of each block.
-struct Equations {
-    blocks: Vec<(DMatrix<f64>, DVector<f64>)>,
-}
-
-impl Equations {
-    fn of(replays: &Replays, slopes: &[Vec<f64>], left: &[f64], over: Over) -> Self {
-        let (count, weights) = (slopes.len(), replays.weights(left));
-        let of_block = |(block, rows): (usize, std::ops::Range<usize>)| {
-            let product = |a: &[f64], b: &[f64]| -> f64 {
-                weights[block] * a[rows.clone()].iter().zip(&b[rows.clone()]).map(|(a, b)| a * b).sum::<f64>()
-            };
-            let normal = DMatrix::from_fn(count, count, |i, j| product(&slopes[i], &slopes[j]));
-            (normal, DVector::from_fn(count, |i, _| product(&slopes[i], left)))
-        };
-        let blocks = replays.blocks().into_iter().enumerate().filter(|(block, _)| over.has(*block));
-        Self { blocks: blocks.map(of_block).collect() }
-    }
-
-    fn sums(&self) -> (DMatrix<f64>, DVector<f64>) {
-        let count = self.blocks.first().map_or(0, |(normal, _)| normal.nrows());
-        let none = (DMatrix::zeros(count, count), DVector::zeros(count));
-        self.blocks.iter().fold(none, |(normal, right), (n, r)| (normal + n, right + r))
-    }
-
-    /// The step that leaves least, numbers that nothing tells left where they are.
-    fn solved(&self) -> Option<DVector<f64>> {
-        let (normal, right) = self.sums();
-        Some(inverse(normal)? * right)
-    }
-
-    /// Covariance of the numbers by a jackknife over blocks, beside a step.
-    fn covariance(&self, by: &DVector<f64>) -> Option<DMatrix<f64>> {
-        let (normal, _) = self.sums();
-        let inverse = inverse(normal)?;
-        let count = self.blocks.len() as f64;
-        let mut sum = DMatrix::zeros(by.len(), by.len());
-        for (own, right) in &self.blocks {
-            let rest = DMatrix::identity(by.len(), by.len()) - MOST_LEFT_OUT * &inverse * own;
-            let change = pseudo_inverse(rest, 1e-3)? * (&inverse * (right - own * by));
-            sum += &change * change.transpose();
-        }
-        // A replay is a simulation, whose own errors are alike in all blocks.
-        Some(sum * ((count - 1.0) / count * (SIMULATED * widening(count - by.len() as f64)).powi(2)))
-    }
-}
-
-/// The inverse of normal equations, each number in its own unit.
-fn inverse(normal: DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let unit = normal.diagonal().map(|square| if square > 0.0 { square.sqrt().recip() } else { 0.0 });
-    let units = DMatrix::from_diagonal(&unit);
-    Some(&units * pseudo_inverse(&units * normal * &units, 1e-6)? * &units)
 }
 
 #[cfg(test)]
