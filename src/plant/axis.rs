@@ -30,8 +30,6 @@ pub struct Body {
     long: Option<Long>,
     /// Whether flanks were calm in the last steps.
     calm: bool,
-    /// The last step, s.
-    last_step_s: f64,
     plain: bool,
     /// Of motor and table.
     held: [Held; 2],
@@ -69,8 +67,9 @@ struct Held {
 /// What changes from step to step; copied out of the body while it runs, so that it can stay in registers.
 #[derive(Debug, Clone, Copy)]
 struct State {
-    /// Time since the start, s.
+    /// Time since the start, and the last step, s.
     time_s: f64,
+    step_s: f64,
     /// What the motor's current says.
     torque: f64,
     motor: Mass,
@@ -109,6 +108,14 @@ impl Mass {
         self.change = velocity - self.velocity;
         self.velocity = velocity;
         self.position = middle + 0.5 * h * velocity;
+    }
+
+    /// Goes a way that is so long per inertia, unless it rests.
+    #[inline(always)]
+    fn goes_further(&mut self, way: f64) {
+        if self.velocity != 0.0 {
+            self.position += way / self.inertia;
+        }
     }
 
     /// Whether it stays at rest or slides on at about its speed.
@@ -164,10 +171,10 @@ impl Body {
         let load_per_motor = 1.0 / physics.motor_per_load;
         let viscous = physics.slope_at(1.0);
         let held = [(); 2].map(|()| Held { near: Nearby::new(&physics), elements: physics.bristle(1.0).elements });
-        let state = State { time_s: 0.0, torque, motor, table };
+        let state = State { time_s: 0.0, step_s, torque, motor, table };
         let laws = Laws { physics, load_per_motor, viscous };
         let calm = laws.flanks().is_none();
-        Body { laws, time_constant_s, pace, long, calm, last_step_s: step_s, plain, held, state }
+        Body { laws, time_constant_s, pace, long, calm, plain, held, state }
     }
 
     /// Advances by `steps` plant steps while the servo asks for `asked`.
@@ -180,11 +187,10 @@ impl Body {
             return;
         }
         let friction = self.friction();
-        if let Some(few) = self.fewer(asked, steps, friction) {
+        if let Some((few, pace)) = self.longer(asked, steps, friction) {
             // What slips or stays where it is is none of the elements' doing.
             let elements = (friction != Acts::Dry).then(|| [0, 1].map(|of| self.held[of].elements));
             let before = self.state;
-            let pace = self.pace_of(few, steps);
             self.slips(friction == Acts::Dry);
             let goes_on = self.step::<true, true>(asked, few, pace);
             self.slips(false);
@@ -205,7 +211,7 @@ impl Body {
     /// How friction acts on the masses.
     fn friction(&mut self) -> Acts {
         let Body { laws: Laws { physics: p, load_per_motor, .. }, held, state, long, .. } = self;
-        let long_s = long.map_or(0.0, |long| long.longest_s[0]);
+        let long_s = long.map_or(0.0, |long| long.longest_s());
         let (mut builds_up, mut holds) = (false, true);
         for (mass, held) in [&state.motor, &state.table].into_iter().zip(held) {
             let stiffness = mass.bristle.stiffness;
@@ -235,37 +241,23 @@ impl Body {
         self.state.table.bristle.slips = slips;
     }
 
-    /// In how many steps the same may be done, if in fewer.
-    fn fewer(&self, asked: f64, steps: usize, friction: Acts) -> Option<usize> {
-        let long = self.long.as_ref().filter(|_| self.calm)?;
-        let physics = &self.laws.physics;
-        let span = steps as f64 * self.pace.step_s;
-        let of_way = span * self.state.motor.velocity.abs() / long.way;
-        let few = (span / long.longest_s[usize::from(friction == Acts::BuildsUp)]).max(of_way).ceil() as usize;
-        (few < steps && physics.saturates(asked) == physics.saturates(self.state.torque)).then_some(few)
-    }
-
-    /// The pace of fewer steps.
-    fn pace_of(&mut self, few: usize, steps: usize) -> Pace {
-        let step_s = steps as f64 * self.pace.step_s / few as f64;
-        match &mut self.long {
-            Some(Long { last, .. }) if last.step_s == step_s => *last,
-            Some(Long { last, .. }) => {
-                *last = Pace::new(step_s, self.time_constant_s);
-                *last
-            }
-            None => Pace::new(step_s, self.time_constant_s),
-        }
+    /// In how many longer steps the same may be done, and their pace.
+    fn longer(&mut self, asked: f64, steps: usize, friction: Acts) -> Option<(usize, Pace)> {
+        let long = self.long.as_mut().filter(|_| self.calm)?;
+        let (span_s, physics) = (steps as f64 * self.pace.step_s, &self.laws.physics);
+        let few = long.fewest(span_s, self.state.motor.velocity, friction == Acts::BuildsUp);
+        let alike = physics.saturates(asked) == physics.saturates(self.state.torque);
+        (few < steps && alike).then(|| (few, long.pace(span_s / few as f64, self.time_constant_s)))
     }
 
     /// Steps at a pace. `WATCHED`: whether flanks are calm is to be known. `LONG`: they are longer than usual, and it is told whether all
     /// masses went on as they did.
     fn step<const WATCHED: bool, const LONG: bool>(&mut self, asked: f64, steps: usize, pace: Pace) -> bool {
         let mut state = self.state;
-        let by = pace.step_s / self.last_step_s;
+        let by = pace.step_s / state.step_s;
         state.motor.change *= by;
         state.table.change *= by;
-        self.last_step_s = pace.step_s;
+        state.step_s = pace.step_s;
         let (laws, own) = (&self.laws, &mut self.held);
         let (mut leaning, mut goes_on) = (Leaning::default(), true);
         let mut seen = |carried: Carried, state: &State| {
@@ -331,14 +323,6 @@ impl Laws {
         self.physics.two_masses.as_ref().filter(|masses| masses.clearance > 0.0)
     }
 
-    /// Mean torque of the motor over a step.
-    #[inline(always)]
-    fn motor_torque(pace: Pace, state: &mut State, asked: f64) -> f64 {
-        let excess = state.torque - asked;
-        state.torque = asked + excess * pace.lag.0;
-        asked + excess * pace.lag.1
-    }
-
     #[inline(always)]
     fn rigid_step<const PLAIN: bool, const LONG: bool>(
         &self,
@@ -348,8 +332,7 @@ impl Laws {
         asked: f64,
     ) {
         let (h, p) = (pace.step_s, &self.physics);
-        let excess = state.torque - asked;
-        let torque = Self::motor_torque(pace, state, asked);
+        let [torque, further] = pace.follow(&mut state.torque, asked);
         let (m, middle_s) = (&mut state.motor, state.time_s + 0.5 * h);
         let middle = m.middle(h);
         if PLAIN {
@@ -358,8 +341,8 @@ impl Laws {
             let torque = p.delivered(torque) - own.near.cogging_torque(middle * self.load_per_motor);
             self.resisted::<LONG, true>(m, own, [h, middle_s], middle, torque);
         }
-        if LONG && m.velocity != 0.0 {
-            m.position += excess * pace.lag_way / m.inertia;
+        if LONG {
+            m.goes_further(further);
         }
         state.time_s += h;
     }
@@ -374,8 +357,7 @@ impl Laws {
         asked: f64,
     ) -> Carried {
         let (h, p) = (pace.step_s, &self.physics);
-        let excess = state.torque - asked;
-        let torque = Self::motor_torque(pace, state, asked);
+        let [torque, further] = pace.follow(&mut state.torque, asked);
         let (motor, table) = (&mut state.motor, &mut state.table);
         let (motor_middle, table_middle) = (motor.middle(h), table.middle(h));
         let (rate, speed) = (motor.velocity - table.velocity, table.velocity);
@@ -392,8 +374,8 @@ impl Laws {
             self.resisted::<LONG, false>(motor, at_motor, times, motor_middle, torque - push);
             self.resisted::<LONG, true>(table, at_table, times, table_middle, push);
         }
-        if LONG && motor.velocity != 0.0 {
-            motor.position += excess * pace.lag_way / motor.inertia;
+        if LONG {
+            motor.goes_further(further);
         }
         state.time_s += h;
         Carried { torque: push, rate, speeds: [speed, table.velocity] }

@@ -242,7 +242,7 @@ impl Begun {
     ) -> Result<Option<Self>, String> {
         let (Some(held), Some(law)) = (servo.held_at_start, &axis.servo) else { return Ok(None) };
         let rows = rows_of_the_beginning(law, observed);
-        let part = Part { rows, ..whole };
+        let part = Part { rows, table: false, ..whole };
         let first = [0..rows];
         let begins = |torque: &TorquePrediction, rows: &[Range<usize>]| {
             replay(axis, observed, torque, rows, &[], servo.speed, part)

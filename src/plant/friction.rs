@@ -6,6 +6,8 @@
 //! (Dahl 1968; with a level that depends on speed: LuGre, Canudas de Wit et al. 1995; its micro-damping adds τ·Ḟ), stepped
 //! implicitly as well. Or with elements that slip one after the other (generalized Maxwell slip, Lampaert et al. 2003).
 
+use super::power::{PER, Power};
+
 /// By what law friction builds up over a displacement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BristleLaw {
@@ -177,22 +179,20 @@ pub struct Curve {
     exponent: f64,
     /// 2ⁿ⁻¹.
     whole: f64,
-    /// A share whose rate is known, and that rate: powers are dear, and shares follow each other closely.
-    known: [f64; 2],
+    /// yⁿ⁻¹.
+    power: Power,
 }
 
 /// A share of the way that is nothing but a rounding, as in most rows of a recording.
 const NOTHING: f64 = 1e-14;
 /// Up to here five terms of a series are as exact as numbers are.
 const CLOSE: f64 = 4e-3;
-/// 1/k; a product is ready before a quotient.
-const PER: [f64; 6] = [f64::INFINITY, 1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0];
 
 impl Curve {
     /// The curve of an exponent; 1 is Dahl's.
     #[must_use]
     pub fn new(exponent: f64) -> Self {
-        Self { exponent, whole: 2f64.powf(exponent - 1.0), known: [0.0; 2] }
+        Self { exponent, whole: 2f64.powf(exponent - 1.0), power: Power::default() }
     }
 
     /// Share of the way that is left after a displacement in units of level over stiffness.
@@ -211,14 +211,7 @@ impl Curve {
 
     #[inline(always)]
     fn rate(&mut self, left: f64) -> f64 {
-        let [per_share, rate] = self.known;
-        let (d, m) = (left * per_share - 1.0, self.exponent - 1.0);
-        if d.abs() < CLOSE {
-            let term = |k: usize| d * PER[k] * (m + 1.0 - k as f64);
-            return rate * (1.0 + term(1) * (1.0 + term(2) * (1.0 + term(3) * (1.0 + term(4) * (1.0 + term(5))))));
-        }
-        self.known = [1.0 / left, self.whole * left.powf(m)];
-        self.known[1]
+        self.whole * self.power.at(left, self.exponent - 1.0)
     }
 
     /// What is left of `left` after a displacement times the rate there.

@@ -4,6 +4,7 @@
 //! and a series about that does for many steps, to the last digits; where it no longer reaches, the next place lies ahead.
 
 use super::physics::{GONE, Physics, Ripple, Spot};
+use super::power::Power;
 
 /// Up to where the series below are as exact as numbers are, to a few roundings: radians of a sine, exponent of an exponential.
 const CLOSE: f64 = 0.1;
@@ -56,42 +57,6 @@ impl Wave {
         let (sine, cosine) = (wave * self.at + phase).sin_cos();
         (self.sine, self.cosine) = (amplitude * sine, amplitude * cosine);
         wave * (x - self.at)
-    }
-}
-
-/// A power of a number near where it is known.
-#[derive(Debug, Clone, Default)]
-struct Power {
-    /// One over where it is known, and the power there.
-    per_place: f64,
-    value: f64,
-}
-
-/// Share of a number up to which the series of its power is as exact.
-const CLOSE_TO_POWER: f64 = 0.02;
-/// 1/k; a product is ready before a quotient.
-const PER: [f64; 8] = [f64::INFINITY, 1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0, 1.0 / 6.0, 1.0 / 7.0];
-
-impl Power {
-    #[inline(always)]
-    fn at(&mut self, x: f64, n: f64) -> f64 {
-        if n == 1.0 {
-            return x;
-        }
-        let d = x * self.per_place - 1.0;
-        if !(d.abs() < CLOSE_TO_POWER) {
-            return self.looked_up(x, n);
-        }
-        let term = |k: usize| d * PER[k] * (n + 1.0 - k as f64);
-        let last = 1.0 + term(5) * (1.0 + term(6) * (1.0 + term(7)));
-        self.value * (1.0 + term(1) * (1.0 + term(2) * (1.0 + term(3) * (1.0 + term(4) * last))))
-    }
-
-    #[cold]
-    fn looked_up(&mut self, x: f64, n: f64) -> f64 {
-        self.per_place = 1.0 / x;
-        self.value = x.powf(n);
-        self.value
     }
 }
 

@@ -17,9 +17,9 @@ const SWINGS_ON: f64 = 0.4;
 pub(super) struct Pace {
     pub step_s: f64,
     /// Rest and mean over a step of a first-order lag.
-    pub lag: (f64, f64),
+    lag: (f64, f64),
     /// Way that what is left of the lag adds to that of its mean, per torque and inertia, s².
-    pub lag_way: f64,
+    lag_way: f64,
 }
 
 impl Pace {
@@ -29,26 +29,54 @@ impl Pace {
         let way = time_constant_s * (step_s - time_constant_s * (1.0 - lag.0)) - 0.5 * step_s * step_s * lag.1;
         Self { step_s, lag, lag_way: way }
     }
+
+    /// Mean over a step of a torque that follows what is asked for, and the way that it adds to that of its mean, per inertia.
+    #[inline(always)]
+    pub fn follow(&self, torque: &mut f64, asked: f64) -> [f64; 2] {
+        let excess = *torque - asked;
+        *torque = asked + excess * self.lag.0;
+        [asked + excess * self.lag.1, excess * self.lag_way]
+    }
 }
 
 /// Steps that are longer where nothing is sudden.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Long {
     /// The longest, s, and the longest while friction builds up.
-    pub longest_s: [f64; 2],
+    longest_s: [f64; 2],
     /// Longest way in a step, motor's coordinate.
-    pub way: f64,
+    way: f64,
     /// The pace of the last ones.
-    pub last: Pace,
+    last: Pace,
 }
 
 impl Long {
-    /// No longer than `longest_s`, nor than `usual_s` while friction builds up, of bodies of these inertias and shares of the friction; `None` where they are no longer than the usual pace.
+    /// No longer than `longest_s`, nor than `usual_s` while friction builds up, of bodies of these inertias and shares of the friction;
+    /// `None` where they are no longer than the usual pace.
     pub fn new(physics: &Physics, [usual_s, longest_s]: [f64; 2], bodies: &[(f64, f64)], pace: Pace) -> Option<Self> {
         let smooth_s = longest_s.min(physics.longest_smooth_step_s());
         let building_s = smooth_s.min(usual_s).min(physics.longest_step_of_bristles_s(bodies));
         let long = Self { longest_s: [smooth_s, building_s], way: physics.longest_smooth_way(), last: pace };
         (smooth_s > pace.step_s).then_some(long)
+    }
+
+    /// The longest, s.
+    pub fn longest_s(&self) -> f64 {
+        self.longest_s[0]
+    }
+
+    /// How few of them a span of time takes at a speed.
+    pub fn fewest(&self, span_s: f64, speed: f64, builds_up: bool) -> usize {
+        let of_way = span_s * speed.abs() / self.way;
+        (span_s / self.longest_s[usize::from(builds_up)]).max(of_way).ceil() as usize
+    }
+
+    /// The pace of such a step.
+    pub fn pace(&mut self, step_s: f64, time_constant_s: f64) -> Pace {
+        if self.last.step_s != step_s {
+            self.last = Pace::new(step_s, time_constant_s);
+        }
+        self.last
     }
 }
 

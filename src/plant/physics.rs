@@ -218,11 +218,11 @@ impl Physics {
             fade(&mut squares, n);
             levels.iter_mut().zip(&squares).for_each(|(level, share)| *level += size * share - less);
         };
-        if let Some(Stribeck { torque, per_velocity, half_exponent }) = self.stribeck {
-            add(v.iter().map(|v| (v * per_velocity).powi(2)).collect(), half_exponent, torque, 0.0);
+        if let Some(stribeck) = self.stribeck {
+            add(v.iter().map(|v| stribeck.square(*v)).collect(), stribeck.half_exponent, stribeck.torque, 0.0);
         }
-        for &Spot { centre, peak, per_width, half_steepness } in &self.spots {
-            add(x.iter().map(|x| ((x - centre) * per_width).powi(2)).collect(), half_steepness, peak, 0.0);
+        for spot in &self.spots {
+            add(x.iter().map(|x| spot.square(*x)).collect(), spot.half_steepness, spot.peak, 0.0);
         }
         if let Some((drop, per_time, left)) = self.drift {
             add((0..v.len()).map(|row| t(row) * per_time).collect(), 1.0, drop, left);
