@@ -140,6 +140,7 @@ struct Missed {
     error: Vec<f64>,
     misses: Vec<f64>,
     avoidable: Vec<f64>,
+    unavoidable: Vec<f64>,
 }
 
 impl Missed {
@@ -148,7 +149,7 @@ impl Missed {
         let misses = replays.misses(&error);
         let avoidable = avoidable(&misses, &unavoidable);
         let beyond: Vec<f64> = avoidable.iter().map(|miss| miss + NOTHING).collect();
-        (is_much(&misses) && is_much(&beyond)).then_some(Self { error, misses, avoidable })
+        (is_much(&misses) && is_much(&beyond)).then_some(Self { error, misses, avoidable, unavoidable })
     }
 }
 
@@ -201,7 +202,7 @@ fn told(
     trials: Vec<Trial>,
     replays: &Replays,
     frame: &Frame,
-    (Missed { error: before, misses, avoidable }, [named, extended]): (&Missed, [&Axis; 2]),
+    (Missed { error: before, misses, avoidable, unavoidable }, [named, extended]): (&Missed, [&Axis; 2]),
     watch: &Watch,
 ) -> Result<Option<(f64, Told)>, Stopped> {
     let best = promising(trials, &replays.beginning(), frame, extended, watch)?;
@@ -224,7 +225,8 @@ fn told(
     if let Some((gain, gained, half)) = refined.first_mut() {
         let leaves_much = *gain < MOSTLY * mean(avoidable, JUDGES);
         if leaves_much && half.trial.law.is_simulated() && strength(gained, misses, JUDGES) > SURELY {
-            let deepest = sharper::in_the_deepest_valley(half.trial.clone(), frame, extended, replays, watch)?;
+            let deepest =
+                sharper::in_the_deepest_valley(half.trial.clone(), frame, extended, (replays, unavoidable), watch)?;
             if let Some((deepest, _)) = deepest {
                 *gained = replays.gained(misses, &deepest.error);
                 (*gain, *half) = (mean(gained, JUDGES), deepest);

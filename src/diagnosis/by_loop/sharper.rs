@@ -90,7 +90,7 @@ fn told(
     if mean_of_worse_half(&avoidable, Over::All) < AVOIDABLE {
         return Ok(None);
     }
-    let deepest = in_the_deepest_valley(start, frame, without, replays, watch)?;
+    let deepest = in_the_deepest_valley(start, frame, without, (replays, &unavoidable), watch)?;
     let Some((half, alike)) = deepest else { return Ok(None) };
     let gained = replays.gained(&misses, &half.error);
     let better = mean(&gained, JUDGES) > 0.0 && strength(&gained, &misses, JUDGES) > LIKELY;
@@ -121,14 +121,26 @@ fn told(
 }
 
 /// The same where one half of the blocks is missed least, of the valleys about where it was, and where that half is missed as little.
+/// With the replays comes how far each block is missed whatever the machine: where no more is, no valley is deeper.
 pub fn in_the_deepest_valley(
     start: Trial,
     frame: &Frame,
     without: &Axis,
-    replays: &Replays,
+    (replays, unavoidable): (&Replays, &[f64]),
     watch: &Watch,
 ) -> Result<Option<(Refined, Vec<Effect>)>, Stopped> {
     let missed = |replays: &Replays, error: &[f64]| mean(&replays.misses(error), GIVES);
+    let is_deepest =
+        |there: &Refined| mean_of_worse_half(&avoidable(&replays.misses(&there.error), unavoidable), GIVES) < AVOIDABLE;
+    let into = |place: &Trial| {
+        let refined = place.clone().refined(frame, without, replays, GIVES, f64::INFINITY)?;
+        Some((missed(replays, &refined.error), refined))
+    };
+    // Mostly the torque has found the right one, and a few steps lead to its bottom.
+    let as_found = into(&start);
+    if let Some((_, there)) = as_found.as_ref().filter(|(_, there)| is_deepest(there)) {
+        return Ok(Some((there.clone(), Vec::new())));
+    }
     let short = replays.beginning();
     let mut bottoms: Vec<(f64, Refined)> = Vec::new();
     for round in 0..ROUNDS {
@@ -149,12 +161,11 @@ pub fn in_the_deepest_valley(
         }
         rated.truncate(VALLEYS);
         let there = watch.each(&rated, (0.985, 0.99), STAGE, |(_, place)| {
-            let refined = place.clone().refined(frame, without, replays, GIVES, f64::INFINITY)?;
-            Some((missed(replays, &refined.error), refined))
+            if place.is_at(&start) { as_found.clone() } else { into(place) }
         })?;
         bottoms.extend(there.into_iter().flatten());
         bottoms.sort_by(|a, b| a.0.total_cmp(&b.0));
-        if bottoms.first().is_none_or(|(missed, _)| *missed >= so_far - SHALLOW) {
+        if bottoms.first().is_none_or(|(missed, there)| *missed >= so_far - SHALLOW || is_deepest(there)) {
             break;
         }
     }

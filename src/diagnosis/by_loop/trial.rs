@@ -369,6 +369,7 @@ impl Trial {
 }
 
 /// A trial at the best of its numbers.
+#[derive(Debug, Clone)]
 pub struct Refined {
     /// There.
     pub trial: Trial,
