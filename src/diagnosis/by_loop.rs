@@ -398,6 +398,7 @@ pub(super) mod tests {
             notes: Vec::new(),
             extended,
             followed: false,
+            imitated: Vec::new(),
             replay: errors.unwrap().replay,
         }
     }

@@ -63,8 +63,9 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
     near = watch.each(&near, (0.91, 0.91), STAGE, in_all_rows)?;
     near.retain(|(share, ..)| *share > LEAST);
     near.sort_by(|a, b| a.1.takes_any_form().cmp(&b.1.takes_any_form()).then(b.0.total_cmp(&a.0)));
-    let parts: Vec<Part> = found.parts.iter().map(|part| part.of_few(bench.rows, every)).collect();
-    for (_, law, place) in near {
+    // Where a law begins or lies is sought near the best of its places, beside causes.
+    let placed = |law: &Foreign, place: f64, beside: &[Part]| -> Result<f64, Stopped> {
+        let parts: Vec<Part> = beside.iter().map(|part| part.of_few(bench.rows, every)).collect();
         let squares = |place: &f64| few.beside((law.regressors)(&frame, *place)).fit(&parts).squares();
         let mut best = (place, squares(&place));
         for halved in 1..=if law.somewhere { HALVED } else { 0 } {
@@ -73,24 +74,36 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
             let nearer = watch.each(&sides, (0.91, 0.91), STAGE, |place| (*place, squares(place)))?;
             best = nearer.into_iter().fold(best, |best, side| if side.1 < best.1 { side } else { best });
         }
-        let with = bench.beside((law.regressors)(bench.frame, best.0));
+        Ok(best.0)
+    };
+    for (_, law, place) in near {
+        let there = placed(law, place, &found.parts)?;
+        let with = bench.beside((law.regressors)(bench.frame, there));
         let fit = with.fit(&found.parts);
         let left = idle_left_out(&with.bench, fit, watch)?;
         let needless = found.parts.len() - left.parts.len();
-        let better = price(found) - price(&left) - NUMBER_PRICE * law.numbers as f64;
+        if needless == 0 {
+            continue;
+        }
+        let stays = |part: &&Part| left.parts.iter().any(|l| l.law.cause == part.law.cause && l.shape == part.shape);
+        // Beside such a law the numbers of the belief may still be a little off, as they may beside the causes.
+        let believed = |part: &&Part| stays(part) || BELIEF.contains(&part.law.cause);
+        let believed: Vec<Part> = found.parts.iter().filter(believed).cloned().collect();
+        let with = bench.beside((law.regressors)(bench.frame, placed(law, there, &believed)?));
+        let least = price(&left).min(price(&with.fit(&believed)));
+        let better = price(found) - least - NUMBER_PRICE * law.numbers as f64;
         let more = found.squares() - left.squares();
         // What the causes that are still needed explain by themselves.
-        let stays = |part: &&Part| left.parts.iter().any(|l| l.law.cause == part.law.cause && l.shape == part.shape);
         let needed: Vec<Part> = found.parts.iter().filter(stays).cloned().collect();
         let own = bench.fit(needed).squares() - found.squares();
         // Several numbers of the belief may well be wrong at once, and need no law without a name for that.
         let guesses = found.parts.iter().filter(|part| !stays(part) && !BELIEF.contains(&part.law.cause)).count();
-        let least = if needless > 1 && guesses > 0 { 0.0 } else { FOR_AS_MANY };
+        let enough = if needless > 1 && guesses > 0 { 0.0 } else { FOR_AS_MANY };
         // In place of one cause, any form also takes what that leaves by being not quite the law that the machine follows, and any law what
         // none holds to.
         let most = if law.takes_any_form() { MOST_OF_A_CURVE } else { LAW_HOLDS * LAW_HOLDS };
-        let in_place = needless > 1 || needless == 1 && more > most * explained;
-        if in_place && better > least && own > MOST * explained {
+        let in_place = needless > 1 || more > most * explained;
+        if in_place && better > enough && own > MOST * explained {
             return Ok(Some(law.goes));
         }
     }

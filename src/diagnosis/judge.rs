@@ -80,6 +80,8 @@ pub struct Judged {
     pub nearest: Option<String>,
     /// Whether the axis follows what is not explained, see [`is_followed`].
     pub followed: bool,
+    /// Causes that a law without a name stands for.
+    pub imitated: Vec<Cause>,
 }
 
 impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
@@ -118,7 +120,8 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
         };
         let (goes, (mut less, mut errors, settled)) = self.watch.both(goes, settled)?;
         if let Some(goes) = goes {
-            return Ok(Judged { refutation: Some(imitation(&found.fit, goes)), ..self.nothing(&found) });
+            let imitated = found.fit.parts.iter().map(|part| part.law.cause).collect();
+            return Ok(Judged { refutation: Some(imitation(&found.fit, goes)), imitated, ..self.nothing(&found) });
         }
         found = settled;
         // Below the noise floor there is nothing but what the encoder makes, which drives the simulation too.
@@ -165,6 +168,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
                 refutation: None,
                 nearest: None,
                 followed: false,
+                imitated: Vec::new(),
             });
         }
         let causes = found.fit.parts.iter().map(|p| p.law.cause);
@@ -209,6 +213,7 @@ impl<'j, 'f, 'a> Judge<'j, 'f, 'a> {
             refutation: None,
             nearest: (followed && untied).then(|| followed::SAYS.to_owned()),
             followed,
+            imitated: Vec::new(),
         }
     }
 

@@ -51,6 +51,7 @@ mod shared;
 pub mod show;
 mod shrink;
 mod steady;
+mod suffices;
 pub mod uncertainty;
 mod valleys;
 pub mod verdict;

@@ -53,7 +53,8 @@ fn believes_fast(axis: &Axis) -> bool {
 }
 
 /// Whether a quieter look has found what the look before has not: causes that explain all where none fitted, or more of them than it
-/// had, or something that no cause fits and that the axis follows where there seemed to be nothing. What is fast it does not add: there it stands in for what the low-pass smears. Nor does it doubt a belief that has something fast:
+/// had, or something that no cause fits and that the axis follows where there seemed to be nothing. Causes that a law without a name stands
+/// for by the look before it does not bring back. What is fast it does not add: there it stands in for what the low-pass smears. Nor does it doubt a belief that has something fast:
 /// what a low-pass smears of that is no cause.
 #[must_use]
 pub fn finds_more(axis: &Axis, again: &Diagnosis, before: &Diagnosis) -> bool {
@@ -64,9 +65,11 @@ pub fn finds_more(axis: &Axis, again: &Diagnosis, before: &Diagnosis) -> bool {
         return before.verdict == Verdict::NoDiscrepancy;
     }
     let doubts = before.verdict == Verdict::NoDiscrepancy && believes_fast(axis);
+    let imitated = found.iter().all(|cause| before.imitated.contains(cause));
     again.verdict == Verdict::Explained
         && is_sure(again)
         && !doubts
+        && !imitated
         && (before.verdict == Verdict::UnknownCause || slow && known.iter().all(|cause| found.contains(cause)))
 }
 

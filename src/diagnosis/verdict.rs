@@ -24,14 +24,11 @@ use super::replayed;
 use super::rivals;
 use super::select::{Search, Selection};
 use super::show::{self, View};
+use super::suffices::what_is_missing;
 use super::uncertainty::{self, Sure};
 use super::whole::Whole;
 use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
-
-/// Judged time below which nothing is said, s, and judged rows.
-const LEAST_SECONDS: f64 = 1.0;
-const LEAST_ROWS: usize = 300;
 
 /// The five answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,6 +95,8 @@ pub struct Diagnosis {
     pub extended: Axis,
     /// Whether the axis follows what is not explained.
     pub(super) followed: bool,
+    /// Causes that a law without a name stands for.
+    pub(super) imitated: Vec<Cause>,
     /// A closed loop of that or of its like, as it was replayed.
     pub(super) replay: Option<Replay>,
 }
@@ -302,7 +301,7 @@ fn answer_on(
             }
         }
     }
-    let Judged { mut verdict, selection: Selection { fit, .. }, gains, replay, followed, .. } = judged;
+    let Judged { mut verdict, selection: Selection { fit, .. }, gains, replay, followed, imitated, .. } = judged;
     notes.extend(nameless(frame, &fit));
     if let Some(band) = vibration {
         verdict = band.beside(bench, verdict, &fit);
@@ -320,6 +319,7 @@ fn answer_on(
         notes,
         extended,
         followed,
+        imitated,
         replay,
     })
 }
@@ -371,36 +371,9 @@ fn insufficient(axis: &Axis, missing: Vec<String>) -> Diagnosis {
         notes: Vec::new(),
         extended: axis.clone(),
         followed: false,
+        imitated: Vec::new(),
         replay: None,
     }
-}
-
-/// What rows lack for anything to be said of them; nothing where they suffice.
-pub(super) fn what_is_missing(frame: &Frame) -> Vec<String> {
-    let mut missing = Vec::new();
-    let (word, torque) = (frame.axis.drive.torque_word(), &frame.columns.torque);
-    if let Some(first) = torque.first().filter(|first| torque.iter().all(|value| value == *first)) {
-        missing.push(format!("{word}: the column is {first} in every row, as if nothing was connected; record what the drive says the motor delivers"));
-        return missing;
-    }
-    let (rows, seconds) = (frame.kept.len(), frame.judged_seconds());
-    if rows < LEAST_ROWS || seconds < LEAST_SECONDS {
-        let (found, needed) = if seconds < LEAST_SECONDS {
-            (format!("{seconds:.2} s"), format!("{LEAST_SECONDS} s"))
-        } else {
-            (format!("{rows} rows that are independent through the filter"), LEAST_ROWS.to_string())
-        };
-        missing.push(format!(
-            "motion: only {found} of the recording are steady enough sliding to be judged, {needed} are needed; record several moves there and back"
-        ));
-        return missing;
-    }
-    let forward = frame.kept.iter().filter(|&&i| frame.v[i] > 0.0).count();
-    let fewer = forward.min(frame.kept.len() - forward);
-    if fewer * 50 < frame.kept.len() {
-        missing.push("both directions: the axis moves one way only, so friction and weight cannot be told apart; record moves there and back".into());
-    }
-    missing
 }
 
 fn findings(axis: &Axis, bench: &Bench, selection: &Selection, sure: Option<&Sure>, empty: &Fit) -> Vec<Finding> {

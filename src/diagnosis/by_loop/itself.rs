@@ -16,7 +16,8 @@ use crate::diagnosis::judge::{Excess, LITTLE_LEFT, TOLERABLE_EXCESS};
 use crate::diagnosis::known::Known;
 use crate::diagnosis::quiet;
 use crate::diagnosis::show::{self, Coordinate};
-use crate::diagnosis::verdict::{Diagnosis, Verdict, what_is_missing};
+use crate::diagnosis::suffices::what_is_missing;
+use crate::diagnosis::verdict::{Diagnosis, Verdict};
 use crate::machine::Axis;
 use std::cell::OnceCell;
 

@@ -84,8 +84,10 @@ fn terms_of(frame: &Frame, resistance: &Resistance, splits: &[Option<TwoMasses>]
         few if few.len() <= FEW => Tables::<FEW, _>::new(frame, Alike(resistance), few).terms(few.len()),
         several => Tables::<LANES, _>::new(frame, Alike(resistance), several).terms(several.len()),
     };
-    // As many in each go, which may go at a time. Few are shared between cores that may have nothing else to do.
-    let most = if sound.len() > LANES { LANES } else { FEW };
+    // As many in each go, which may go at a time. Few are shared between cores that may have nothing else to do, and flanks hold so
+    // many numbers each that no more of them find room in registers.
+    let flanks = sound.iter().any(|masses| masses.clearance > 0.0);
+    let most = if sound.len() > LANES && !flanks { LANES } else { FEW };
     let in_a_go = sound.len().div_ceil(sound.len().div_ceil(most).max(1)).max(1);
     let mut found = sound.par_chunks(in_a_go).flat_map_iter(together).collect::<Vec<_>>().into_iter();
     splits.iter().map(|split| split.and_then(|_| found.next()).unwrap_or_default()).collect()

@@ -5,6 +5,9 @@ use super::{lanes, larger};
 use crate::diagnosis::many::decay;
 use crate::plant::friction::Friction;
 
+/// Share of its level from which on friction has built up: what is missing is nothing beside any noise.
+const BUILT_UP: f64 = 0.99999;
+
 /// How friction has built up on the way of each table.
 #[derive(Clone, Copy)]
 pub(super) enum Bristles<const N: usize> {
@@ -41,7 +44,23 @@ impl<const N: usize> Bristles<N> {
         }
     }
 
-    /// The same with the bristles left where they are.
+    /// Torque of each as long as it goes on one way, where all have built up as far as they will: that of dry friction.
+    #[inline(always)]
+    pub(super) fn built_up(&self, speed: [f64; N], level: [f64; N]) -> Option<[f64; N]> {
+        let mut built_up = true;
+        let mut torque = [0.0; N];
+        for l in 0..N {
+            let force = match self {
+                Self::Plain { force, .. } => force[l],
+                Self::Other(frictions) => frictions[l].bristle.force,
+            };
+            torque[l] = level[l].copysign(speed[l]);
+            built_up &= force * 1.0f64.copysign(speed[l]) >= BUILT_UP * level[l];
+        }
+        built_up.then_some(torque)
+    }
+
+    /// Torque after each was moved so far at its level, with the bristles left where they are.
     #[inline(always)]
     pub(super) fn after(&self, way: [f64; N], level: [f64; N]) -> [f64; N] {
         match self {

@@ -10,6 +10,7 @@ use crate::plant::coupling::Giving;
 const SWING_S: f64 = 4e-3;
 
 /// Where the tables are.
+#[derive(Clone, Copy)]
 struct State<const N: usize> {
     position: [f64; N],
     speed: [f64; N],
@@ -126,17 +127,40 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
                 #[inline(always)]
                 |free, _| lanes(|l| larger(smaller(free[l], dry[l]), -dry[l])),
             ),
-            Some(bristles) => self.stepping(
-                row,
-                yielding,
-                state,
-                &resisting,
-                #[inline(always)]
-                |_, v| {
-                    let torque = bristles.moved(lanes(|l| self.step_s * v[l]), resisting.level);
-                    lanes(|l| self.mobility[l] * self.share[l] * torque[l])
-                },
-            ),
+            Some(bristles) => {
+                // In most rows all slide on one way, and what has built up is dry friction.
+                if let Some(built_up) = bristles.built_up(state.speed, resisting.level) {
+                    let (before, rubbed) = (*state, lanes(|l| self.mobility[l] * self.share[l] * built_up[l]));
+                    let goes_on = |v: &[f64; N]| (0..N).fold(true, |all, l| all & (v[l] * built_up[l] >= 0.0));
+                    let mut all_go_on = true;
+                    let shares = self.stepping(
+                        row,
+                        yielding,
+                        state,
+                        &resisting,
+                        #[inline(always)]
+                        |_, v| {
+                            all_go_on &= goes_on(&v);
+                            rubbed
+                        },
+                    );
+                    if all_go_on && goes_on(&state.speed) {
+                        return shares;
+                    }
+                    *state = before;
+                }
+                self.stepping(
+                    row,
+                    yielding,
+                    state,
+                    &resisting,
+                    #[inline(always)]
+                    |_, v| {
+                        let torque = bristles.moved(lanes(|l| self.step_s * v[l]), resisting.level);
+                        lanes(|l| self.mobility[l] * self.share[l] * torque[l])
+                    },
+                )
+            }
         }
     }
 
