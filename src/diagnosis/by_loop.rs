@@ -332,7 +332,7 @@ fn promising(
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(in crate::diagnosis) mod tests {
     use super::*;
     use crate::diagnosis::frame::Columns;
     use crate::diagnosis::gain::HeldOut;
@@ -425,7 +425,7 @@ pub(super) mod tests {
         completed(belief, (replays.as_ref(), None), &frame, silent, &watch).unwrap()
     }
 
-    pub(super) fn clearance(width_um: f64) -> Effect {
+    pub(in crate::diagnosis) fn clearance(width_um: f64) -> Effect {
         Effect::Backlash {
             width_um,
             table_inertia_share: 0.4,

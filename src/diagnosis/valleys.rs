@@ -2,23 +2,26 @@
 //! stiffness, and flanks that are soft and have hardly any play are a spring: a fit goes down to the bottom of the valley in which
 //! it began. Once the other causes are known the next ones are looked into.
 
-use super::causes::Law;
+use super::causes::{Law, loose_spring, table_side};
 use super::fit::{Bench, Fit};
 use super::judge::{Excess, LITTLE_LEFT};
 use super::progress::{Stopped, Watch};
-use super::select::{is_physical, price};
-use crate::machine::Cause;
+use super::select::{NUMBER_PRICE, is_physical, price};
+use crate::machine::{Cause, Effect, TwoMasses};
 
 /// Most steps of a fit by itself, and with all the others.
 const STEPS: [usize; 2] = [6, 4];
 /// Of the starts of a spring in place of a clearance one in so many is tried, where nothing shakes it.
 const EVERY: usize = 3;
+/// Damping ratios at which a spring is begun with in place of flanks, which are damped more.
+const DAMPED: [f64; 2] = [0.03, 0.15];
 
 /// The fit, or the same causes in a better valley of what is simulated.
 ///
 /// # Errors
 /// [`Stopped`] when the watch's caller said so.
 pub fn settled(bench: &Bench, laws: &[&'static Law], fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
+    let fit = without_hair_of_play(bench, laws, fit);
     let Some(at) = fit.table() else { return Ok(fit) };
     if Excess::of(bench, &fit, &fit).largest() <= LITTLE_LEFT {
         return Ok(fit);
@@ -43,4 +46,66 @@ pub fn settled(bench: &Bench, laws: &[&'static Law], fit: Fit, watch: &Watch) ->
         Some(bench.refine(there, 0, STEPS[1])).filter(|fit| is_physical(bench, fit))
     })?;
     Ok(found.into_iter().flatten().chain([fit]).min_by(|a, b| price(a).total_cmp(&price(b))).unwrap_or(beside))
+}
+
+/// The fit with a spring in place of a clearance whose flanks give more under the friction of the table, to either side, than it is wide,
+/// where that leaves no more than play may cost: then the simpler cause is what there is.
+fn without_hair_of_play(bench: &Bench, laws: &[&'static Law], fit: Fit) -> Fit {
+    let spring = laws.iter().find(|law| law.cause == Cause::DriveCompliance);
+    let clearance = fit
+        .table()
+        .map(|at| (at, &fit.parts[at]))
+        .filter(|(_, part)| part.law.cause == Cause::Backlash && !loose_spring::is(part));
+    let Some((spring, (at, part))) = spring.zip(clearance) else { return fit };
+    // Rows may show less play than they can tell.
+    let masses = table_side::split(bench.frame, Effect::from_values(Cause::Backlash, &part.shape));
+    let gives = |m: &TwoMasses| 2.0 * m.table_friction_share * bench.frame.belief.coulomb / m.stiffness > m.clearance;
+    let Some(masses) = masses.filter(gives) else { return fit };
+    let beside = bench.without(&fit, at);
+    let with = |damping: &f64| {
+        let mut shape = table_side::swing_of(&masses);
+        shape.splice(3.., [*damping]);
+        let own = bench.parts_under(spring, vec![shape], &bench.resistance_of(&fit));
+        bench.fit(beside.parts.iter().cloned().chain(own).collect())
+    };
+    let start = DAMPED.iter().map(with).min_by(|a, b| price(a).total_cmp(&price(b)));
+    let last = beside.parts.len();
+    let there = start.map(|start| bench.refine(bench.refine_roughly(start, last, STEPS[0]), 0, STEPS[1]));
+    there.filter(|there| is_physical(bench, there) && price(there) < price(&fit) + NUMBER_PRICE).unwrap_or(fit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::by_loop::tests::{clearance, recorded, rig};
+    use crate::diagnosis::causes::{LAWS, law};
+    use crate::diagnosis::frame::Frame;
+    use crate::diagnosis::known::Known;
+
+    /// What becomes of a clearance with these numbers where this is hidden.
+    fn settled_from(hidden: Effect, shape: [f64; 4]) -> Cause {
+        let excerpt = recorded(&[hidden], 0.05);
+        let (columns, axis) = (excerpt.columns.as_ref().unwrap().clone().thinned(), rig());
+        let frame = Frame::new(&axis, &columns, None);
+        let bench = Bench::new(&frame, &Known::of(&axis, &frame));
+        let begun = bench.fit(bench.parts(law(Cause::Backlash), vec![shape.to_vec()]));
+        let found = bench.refine(begun, 0, 8);
+        let watch = Watch::new(&|_, _| true);
+        settled(&bench, &LAWS, found, &watch).unwrap().parts[0].law.cause
+    }
+
+    #[test]
+    fn flanks_with_a_hair_of_play_are_a_spring_and_a_clearance_stays_one() {
+        let omega = std::f64::consts::TAU * 60.0;
+        let stiffness_n_um = omega * omega * rig().base.inertia * 0.5 * 0.5 / rig().drive.motor_stiffness(1.0);
+        let spring = Effect::DriveCompliance {
+            resonance_hz: 60.0,
+            stiffness_n_um,
+            table_inertia_share: 0.5,
+            table_friction_share: 0.5,
+            damping_ratio: 0.06,
+        };
+        assert_eq!(settled_from(spring, [0.1, 0.5, 0.5, 100.0]), Cause::DriveCompliance);
+        assert_eq!(settled_from(clearance(12.0), [12.0, 0.4, 0.6, 600.0]), Cause::Backlash);
+    }
 }
