@@ -86,12 +86,6 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
             continue;
         }
         let stays = |part: &&Part| left.parts.iter().any(|l| l.law.cause == part.law.cause && l.shape == part.shape);
-        // Beside such a law the numbers of the belief may still be a little off, as they may beside the causes.
-        let believed = |part: &&Part| stays(part) || BELIEF.contains(&part.law.cause);
-        let believed: Vec<Part> = found.parts.iter().filter(believed).cloned().collect();
-        let with = bench.beside((law.regressors)(bench.frame, placed(law, there, &believed)?));
-        let least = price(&left).min(price(&with.fit(&believed)));
-        let better = price(found) - least - NUMBER_PRICE * law.numbers as f64;
         let more = found.squares() - left.squares();
         // What the causes that are still needed explain by themselves.
         let needed: Vec<Part> = found.parts.iter().filter(stays).cloned().collect();
@@ -103,7 +97,20 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
         // none holds to.
         let most = if law.takes_any_form() { MOST_OF_A_CURVE } else { LAW_HOLDS * LAW_HOLDS };
         let in_place = needless > 1 || more > most * explained;
-        if in_place && better > enough && own > MOST * explained {
+        if !in_place || own <= MOST * explained {
+            continue;
+        }
+        let better = |left: &Fit| price(found) - price(left) - NUMBER_PRICE * law.numbers as f64;
+        // Beside such a law the numbers of the belief may still be a little off, as they may beside the causes: each that was left out may have
+        // taken as much with it as a cause must gain.
+        let beside_belief = || {
+            let stays = |part: &&Part| stays(part) || BELIEF.contains(&part.law.cause);
+            let believed: Vec<Part> = found.parts.iter().filter(stays).cloned().collect();
+            let with = bench.beside((law.regressors)(bench.frame, placed(law, there, &believed)?));
+            Ok(better(&with.fit(&believed)))
+        };
+        let (alone, most) = (better(&left), LEAST_GAIN * needless as f64);
+        if alone > enough || alone + most > enough && !law.takes_any_form() && beside_belief()? > enough {
             return Ok(Some(law.goes));
         }
     }

@@ -21,10 +21,9 @@ const DAMPED: [f64; 2] = [0.03, 0.15];
 /// # Errors
 /// [`Stopped`] when the watch's caller said so.
 pub fn settled(bench: &Bench, laws: &[&'static Law], fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
-    let fit = without_hair_of_play(bench, laws, fit);
     let Some(at) = fit.table() else { return Ok(fit) };
     if Excess::of(bench, &fit, &fit).largest() <= LITTLE_LEFT {
-        return Ok(fit);
+        return Ok(without_hair_of_play(bench, laws, fit));
     }
     let part = &fit.parts[at];
     let beside = bench.without(&fit, at);
@@ -91,7 +90,7 @@ mod tests {
         let begun = bench.fit(bench.parts(law(Cause::Backlash), vec![shape.to_vec()]));
         let found = bench.refine(begun, 0, 8);
         let watch = Watch::new(&|_, _| true);
-        settled(&bench, &LAWS, found, &watch).unwrap().parts[0].law.cause
+        settled(&bench, LAWS, found, &watch).unwrap().parts[0].law.cause
     }
 
     #[test]

@@ -84,10 +84,8 @@ fn terms_of(frame: &Frame, resistance: &Resistance, splits: &[Option<TwoMasses>]
         few if few.len() <= FEW => Tables::<FEW, _>::new(frame, Alike(resistance), few).terms(few.len()),
         several => Tables::<LANES, _>::new(frame, Alike(resistance), several).terms(several.len()),
     };
-    // As many in each go, which may go at a time. Few are shared between cores that may have nothing else to do, and flanks hold so
-    // many numbers each that no more of them find room in registers.
-    let flanks = sound.iter().any(|masses| masses.clearance > 0.0);
-    let most = if sound.len() > LANES && !flanks { LANES } else { FEW };
+    // As many in each go, which may go at a time. Few are shared between cores that may have nothing else to do.
+    let most = if sound.len() > LANES { LANES } else { FEW };
     let in_a_go = sound.len().div_ceil(sound.len().div_ceil(most).max(1)).max(1);
     let mut found = sound.par_chunks(in_a_go).flat_map_iter(together).collect::<Vec<_>>().into_iter();
     splits.iter().map(|split| split.and_then(|_| found.next()).unwrap_or_default()).collect()
@@ -255,14 +253,22 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
             lag.resize(N * lags, 0.0);
             let [extra, lag] = [extra, lag].map(|column| column.as_chunks_mut::<N>().0);
             let sliding = if self.flanks { None } else { Some(self.sliding()) };
-            for s in &self.frame.columns.stretches {
-                widest(
-                    #[inline(always)]
-                    || match &sliding {
-                        Some(sliding) => self.behind_springs(sliding, s.clone(), extra, lag),
-                        None => self.behind_flanks(s.clone(), extra, lag),
-                    },
-                );
+            for s in self.frame.columns.stretches.iter().cloned() {
+                // Each by itself: what else may be done is in the way of the registers.
+                match &sliding {
+                    Some(sliding) => widest(
+                        #[inline(always)]
+                        || self.behind_springs(sliding, s, extra, lag),
+                    ),
+                    None if self.bristles.is_some() => widest(
+                        #[inline(always)]
+                        || self.behind_flanks::<true>(s, extra, lag),
+                    ),
+                    None => widest(
+                        #[inline(always)]
+                        || self.behind_flanks::<false>(s, extra, lag),
+                    ),
+                }
             }
             let torques = self.frame.low_passed_together(extra);
             let tables =

@@ -24,8 +24,14 @@ struct State<const N: usize> {
 }
 
 impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
+    /// Moves tables along the rows, under friction that builds up or that is there at once.
     #[inline(always)]
-    pub(super) fn behind_flanks(&self, rows: Range<usize>, extra: &mut [[f64; N]], lag: &mut [[f64; N]]) {
+    pub(super) fn behind_flanks<const BUILDS_UP: bool>(
+        &self,
+        rows: Range<usize>,
+        extra: &mut [[f64; N]],
+        lag: &mut [[f64; N]],
+    ) {
         let unit = self.frame.unit;
         let giving = Giving::new(self.frame.columns.period_s, self.step_s);
         let settled = (SWING_S / self.frame.columns.period_s).ceil() as usize;
@@ -41,7 +47,8 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
             loose: [false; N],
         };
         // How friction has built up on the way of each table, and as the motor's way has it where a table moves with that.
-        let (mut bristles, mut with_motor) = (self.bristles, self.bristles);
+        let mut bristles = if BUILDS_UP { self.bristles } else { None };
+        let mut with_motor = bristles;
         let mut any = false;
         extra[rows.start] = [0.0; N];
         if let Some(last) = lag.get_mut(rows.end - 1) {
