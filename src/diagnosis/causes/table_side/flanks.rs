@@ -196,21 +196,25 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         for step in 0..self.steps {
             let s = (step as f64 + 0.5) * per_step;
             let (motor, speed) = (way.position(s), way.speed(s) * per_span);
-            let mut free = [0.0; N];
-            for l in 0..N {
-                let wind = (motor + give[l]) - middle[l];
-                // Flanks push and never pull.
-                let outward = self.damping[l] * ((speed + giving[l]) - v[l]);
-                let spring = self.stiffness[l] * wind.abs() + (outward * 1.0f64.copysign(wind) - slack[l]);
-                let push = if wind.abs() > self.half[l] { larger(spring, 0.0) } else { 0.0 };
-                nearest[l] = smaller(wind.abs(), nearest[l]);
-                let push = push.copysign(wind);
-                [give[l], giving[l], answered[l]] =
-                    yielding.step([give[l], giving[l], answered[l]], push, motor_mobility[l]);
-                sum[l] += push;
-                far[l] += s * push;
-                free[l] = (self.kept[l] * v[l] - pull[l]) + self.mobility[l] * push;
-            }
+            // One number of all tables after the other, so that registers hold four at a time.
+            let wind: [f64; N] = lanes(|l| (motor + give[l]) - middle[l]);
+            let side: [f64; N] = lanes(|l| 1.0f64.copysign(wind[l]));
+            let far_apart: [f64; N] = lanes(|l| wind[l].abs());
+            let outward: [f64; N] = lanes(|l| self.damping[l] * ((speed + giving[l]) - v[l]));
+            // Flanks push and never pull.
+            let spring: [f64; N] =
+                lanes(|l| larger(self.stiffness[l] * far_apart[l] + (outward[l] * side[l] - slack[l]), 0.0));
+            let push: [f64; N] = lanes(|l| if far_apart[l] > self.half[l] { spring[l] } else { 0.0 });
+            let push: [f64; N] = lanes(|l| push[l] * side[l]);
+            nearest = lanes(|l| smaller(far_apart[l], nearest[l]));
+            let given: [[f64; 3]; N] =
+                std::array::from_fn(|l| yielding.step([give[l], giving[l], answered[l]], push[l], motor_mobility[l]));
+            give = lanes(|l| given[l][0]);
+            giving = lanes(|l| given[l][1]);
+            answered = lanes(|l| given[l][2]);
+            sum = lanes(|l| sum[l] + push[l]);
+            far = lanes(|l| far[l] + s * push[l]);
+            let free: [f64; N] = lanes(|l| (self.kept[l] * v[l] - pull[l]) + self.mobility[l] * push[l]);
             let rubbed = rub(free, v);
             for l in 0..N {
                 v[l] = free[l] - rubbed[l];
