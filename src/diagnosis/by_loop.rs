@@ -139,7 +139,6 @@ fn note_of_miss(axis: &Axis, found: &Diagnosis, observed: &Observed, missed: &st
 struct Missed {
     error: Vec<f64>,
     misses: Vec<f64>,
-    avoidable: Vec<f64>,
     unavoidable: Vec<f64>,
 }
 
@@ -147,9 +146,8 @@ impl Missed {
     fn by(machine: &Axis, replays: &Replays) -> Option<Self> {
         let (error, unavoidable) = replays.error_and_unavoidable(machine)?;
         let misses = replays.misses(&error);
-        let avoidable = avoidable(&misses, &unavoidable);
-        let beyond: Vec<f64> = avoidable.iter().map(|miss| miss + NOTHING).collect();
-        (is_much(&misses) && is_much(&beyond)).then_some(Self { error, misses, avoidable, unavoidable })
+        let beyond: Vec<f64> = avoidable(&misses, &unavoidable).iter().map(|miss| miss + NOTHING).collect();
+        (is_much(&misses) && is_much(&beyond)).then_some(Self { error, misses, unavoidable })
     }
 }
 
@@ -202,11 +200,12 @@ fn told(
     trials: Vec<Trial>,
     replays: &Replays,
     frame: &Frame,
-    (Missed { error: before, misses, avoidable, unavoidable }, [named, extended]): (&Missed, [&Axis; 2]),
+    (Missed { error: before, misses, unavoidable }, [named, extended]): (&Missed, [&Axis; 2]),
     watch: &Watch,
 ) -> Result<Option<(f64, Told)>, Stopped> {
     let best = promising(trials, &replays.beginning(), frame, extended, watch)?;
-    let enough = |over| LEAST_EXPLAINED * mean(avoidable, over);
+    let avoidable = avoidable(misses, unavoidable);
+    let enough = |over| LEAST_EXPLAINED * mean(&avoidable, over);
     let hopeful = mean(misses, GIVES) - HOPE * enough(GIVES);
     let refine = |trial: Trial| {
         let refined = trial.refined(frame, extended, replays, GIVES, hopeful)?;
@@ -223,7 +222,7 @@ fn told(
         refined.insert(usize::from(spring.0 < ALIKE * gain), spring);
     }
     if let Some((gain, gained, half)) = refined.first_mut() {
-        let leaves_much = *gain < MOSTLY * mean(avoidable, JUDGES);
+        let leaves_much = *gain < MOSTLY * mean(&avoidable, JUDGES);
         if leaves_much && half.trial.law.is_simulated() && strength(gained, misses, JUDGES) > SURELY {
             let deepest =
                 sharper::in_the_deepest_valley(half.trial.clone(), frame, extended, (replays, unavoidable), watch)?;
@@ -243,7 +242,7 @@ fn told(
         && !half.trial.is_stopped();
     let Some(by_half) = half.trial.on(frame, extended).filter(|_| explains) else { return Ok(None) };
     let verdict = match by_torque(frame, replays, [named, &by_half]) {
-        Some(Verdict::PartlyExplained) if *gain < MOSTLY * mean(avoidable, JUDGES) => return Ok(None),
+        Some(Verdict::PartlyExplained) if *gain < MOSTLY * mean(&avoidable, JUDGES) => return Ok(None),
         Some(verdict) => verdict,
         None => return Ok(None),
     };

@@ -109,8 +109,8 @@ pub fn stands_for(bench: &Bench, empty: &Fit, found: &Fit, watch: &Watch) -> Res
             let with = bench.beside((law.regressors)(bench.frame, placed(law, there, &believed)?));
             Ok(better(&with.fit(&believed)))
         };
-        let (alone, most) = (better(&left), LEAST_GAIN * needless as f64);
-        if alone > enough || alone + most > enough && !law.takes_any_form() && beside_belief()? > enough {
+        let (alone, regained) = (better(&left), LEAST_GAIN * needless as f64);
+        if alone > enough || alone + regained > enough && !law.takes_any_form() && beside_belief()? > enough {
             return Ok(Some(law.goes));
         }
     }

@@ -7,7 +7,7 @@ use super::fit::{Bench, Fit};
 use super::judge::{Excess, LITTLE_LEFT};
 use super::progress::{Stopped, Watch};
 use super::select::{NUMBER_PRICE, is_physical, price};
-use crate::machine::{Cause, Effect, TwoMasses};
+use crate::machine::{Cause, Effect};
 
 /// Most steps of a fit by itself, and with all the others.
 const STEPS: [usize; 2] = [6, 4];
@@ -23,7 +23,7 @@ const DAMPED: [f64; 2] = [0.03, 0.15];
 pub fn settled(bench: &Bench, laws: &[&'static Law], fit: Fit, watch: &Watch) -> Result<Fit, Stopped> {
     let Some(at) = fit.table() else { return Ok(fit) };
     if Excess::of(bench, &fit, &fit).largest() <= LITTLE_LEFT {
-        return Ok(without_hair_of_play(bench, laws, fit));
+        return Ok(without_hair_of_play(bench, laws, fit, at));
     }
     let part = &fit.parts[at];
     let beside = bench.without(&fit, at);
@@ -36,41 +36,35 @@ pub fn settled(bench: &Bench, laws: &[&'static Law], fit: Fit, watch: &Watch) ->
     let as_spring = spring.map(|&law| (law, bench.starts(law, &beside).into_iter().step_by(every).collect()));
     let tried: Vec<(&'static Law, Vec<Vec<f64>>)> =
         as_spring.chain([(part.law, (part.law.manner.valleys)(&part.shape))]).collect();
-    let resistance = bench.resistance_of(&fit);
     let found = watch.each(&tried, (0.9, 0.9), "looking into other valleys", |(law, shapes)| {
-        let with = |own| bench.fit(others.iter().cloned().chain([own]).collect());
-        let starts = bench.parts_under(law, shapes.clone(), &resistance).into_iter().map(with);
-        let start = starts.min_by(|a, b| price(a).total_cmp(&price(b)))?;
-        let there = bench.refine_roughly(start, others.len(), STEPS[0]);
-        Some(bench.refine(there, 0, STEPS[1])).filter(|fit| is_physical(bench, fit))
+        in_its_place(bench, &fit, &beside, law, shapes.clone())
     })?;
     Ok(found.into_iter().flatten().chain([fit]).min_by(|a, b| price(a).total_cmp(&price(b))).unwrap_or(beside))
 }
 
-/// The fit with a spring in place of a clearance whose flanks give more under the friction of the table, to either side, than it is wide,
-/// where that leaves no more than play may cost: then the simpler cause is what there is.
-fn without_hair_of_play(bench: &Bench, laws: &[&'static Law], fit: Fit) -> Fit {
+/// A set with a law in place of its table, from the best of these starts; `None` beyond physical bounds. `beside` is the set without the
+/// table.
+fn in_its_place(bench: &Bench, set: &Fit, beside: &Fit, law: &'static Law, starts: Vec<Vec<f64>>) -> Option<Fit> {
+    let with = |own| bench.fit(beside.parts.iter().cloned().chain([own]).collect());
+    let starts = bench.parts_under(law, starts, &bench.resistance_of(set)).into_iter().map(with);
+    let start = starts.min_by(|a, b| price(a).total_cmp(&price(b)))?;
+    let there = bench.refine_roughly(start, beside.parts.len(), STEPS[0]);
+    Some(bench.refine(there, 0, STEPS[1])).filter(|fit| is_physical(bench, fit))
+}
+
+/// The fit with a spring in place of flanks that give more than they are apart, where that leaves no more than play may cost: then the
+/// simpler cause is what there is.
+fn without_hair_of_play(bench: &Bench, laws: &[&'static Law], fit: Fit, at: usize) -> Fit {
+    let (part, frame) = (&fit.parts[at], bench.frame);
     let spring = laws.iter().find(|law| law.cause == Cause::DriveCompliance);
-    let clearance = fit
-        .table()
-        .map(|at| (at, &fit.parts[at]))
-        .filter(|(_, part)| part.law.cause == Cause::Backlash && !loose_spring::is(part));
-    let Some((spring, (at, part))) = spring.zip(clearance) else { return fit };
-    // Rows may show less play than they can tell.
-    let masses = table_side::split(bench.frame, Effect::from_values(Cause::Backlash, &part.shape));
-    let gives = |m: &TwoMasses| 2.0 * m.table_friction_share * bench.frame.belief.coulomb / m.stiffness > m.clearance;
-    let Some(masses) = masses.filter(gives) else { return fit };
-    let beside = bench.without(&fit, at);
-    let with = |damping: &f64| {
-        let mut shape = table_side::swing_of(&masses);
-        shape.splice(3.., [*damping]);
-        let own = bench.parts_under(spring, vec![shape], &bench.resistance_of(&fit));
-        bench.fit(beside.parts.iter().cloned().chain(own).collect())
+    let Some(spring) = spring.filter(|_| part.law.cause == Cause::Backlash && !loose_spring::is(part)) else {
+        return fit;
     };
-    let start = DAMPED.iter().map(with).min_by(|a, b| price(a).total_cmp(&price(b)));
-    let last = beside.parts.len();
-    let there = start.map(|start| bench.refine(bench.refine_roughly(start, last, STEPS[0]), 0, STEPS[1]));
-    there.filter(|there| is_physical(bench, there) && price(there) < price(&fit) + NUMBER_PRICE).unwrap_or(fit)
+    // Rows may show less play than they can tell.
+    let masses = table_side::split(frame, Effect::from_values(Cause::Backlash, &part.shape));
+    let starts = DAMPED.iter().filter_map(|damping| table_side::as_spring(frame, masses.as_ref()?, *damping)).collect();
+    let there = in_its_place(bench, &fit, &bench.without(&fit, at), spring, starts);
+    there.filter(|there| price(there) < price(&fit) + NUMBER_PRICE).unwrap_or(fit)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 //! round; while neither happens, they may be longer.
 
 use super::coupling::{CALM, Leaning, transmitted};
-use super::friction::{Bristle, Elements, Friction};
+use super::friction::{Bristle, Elements, Friction, SLIPS};
 use super::nearby::Nearby;
 use super::pace::{Long, Pace};
 use super::physics::Physics;
@@ -15,8 +15,6 @@ use crate::machine::TwoMasses;
 
 /// Share of its speed by which a motion changes in a step that goes on.
 const STEADY: f64 = 0.1;
-/// Share of its level from which on friction that builds up slips.
-const SLIPS: f64 = 0.99999;
 /// Share of the way over which it builds up that a mass at rest goes in a step.
 const RESTS: f64 = 3e-4;
 

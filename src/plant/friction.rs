@@ -8,6 +8,9 @@
 
 use super::power::{PER, Power};
 
+/// Share of its level from which on friction that builds up slips as if it were dry: what is missing is nothing beside any noise.
+pub const SLIPS: f64 = 0.99999;
+
 /// By what law friction builds up over a displacement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BristleLaw {

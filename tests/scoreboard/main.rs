@@ -9,6 +9,7 @@ mod by_loop;
 mod coarse_encoder;
 mod generated;
 mod leaning;
+mod nameless;
 mod predicted;
 mod quiet;
 mod saturated;

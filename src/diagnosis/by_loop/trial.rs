@@ -4,7 +4,7 @@ use super::equations::Equations;
 use super::replays::Replays;
 use crate::diagnosis::belief;
 use crate::diagnosis::causes::presliding_friction::{BRISTLE, OF_ANY_EXPONENT, WITHIN_STEPS};
-use crate::diagnosis::causes::table_side::{split, swing_of};
+use crate::diagnosis::causes::table_side::{as_spring, split, swing_of};
 use crate::diagnosis::causes::{Law, Resistance, Rest, Scale, law};
 use crate::diagnosis::frame::Frame;
 use crate::diagnosis::known::LAW_HOLDS;
@@ -224,17 +224,12 @@ impl Trial {
         *torque > LAW_HOLDS * frame.belief.coulomb && (slow as f64) < FEW_ROWS * frame.kept.len() as f64
     }
 
-    /// The spring that a clearance is whose flanks give more under the friction of the table, to either side, than it is wide: one may be as
-    /// good, and then is the simpler cause.
+    /// The spring that a clearance may be ([`as_spring`]): one may be as good, and then is the simpler cause.
     #[must_use]
     pub fn as_spring(&self, frame: &Frame, axis: &Axis) -> Option<Self> {
         let masses = self.on(frame, axis)?.two_masses().ok()??;
-        let gives = 2.0 * masses.table_friction_share * frame.belief.coulomb / masses.stiffness;
-        let mut shape = swing_of(&masses);
-        // Flanks that meet are damped more than any spring.
-        *shape.last_mut()? = SPRING_DAMPING;
-        let spring = || Self { law: law(Cause::DriveCompliance), shape, ..self.clone() };
-        (self.law.cause == Cause::Backlash && gives > masses.clearance).then(spring)
+        let shape = as_spring(frame, &masses, SPRING_DAMPING).filter(|_| self.law.cause == Cause::Backlash)?;
+        Some(Self { law: law(Cause::DriveCompliance), shape, ..self.clone() })
     }
 
     /// Whether a number has gone as far as its law lets it: what asks for more is no such cause.

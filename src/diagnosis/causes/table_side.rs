@@ -65,6 +65,15 @@ pub fn swing_of(masses: &TwoMasses) -> Vec<f64> {
     vec![own / TAU, share, masses.table_friction_share / share, damping_ratio]
 }
 
+/// The spring, as the law of an elastic drive has it, that flanks are which give more under the friction of the table, to either side,
+/// than they are apart; `None` where they are farther. Flanks that meet are damped more than any spring, whose damping ratio is told.
+pub fn as_spring(frame: &Frame, masses: &TwoMasses, damping_ratio: f64) -> Option<Vec<f64>> {
+    let gives = 2.0 * masses.table_friction_share * frame.belief.coulomb / masses.stiffness;
+    let mut shape = swing_of(masses);
+    *shape.last_mut()? = damping_ratio;
+    (gives > masses.clearance).then_some(shape)
+}
+
 /// Standard deviation of a spring's damping ratio by what nobody knows: viscous friction may act on the motor or on the table, where
 /// it damps the table's swing as the spring's own damping does, and need not be shared as dry friction is.
 pub fn open_damping(frame: &Frame, effect: &Effect) -> f64 {

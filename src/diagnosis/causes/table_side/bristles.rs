@@ -3,10 +3,7 @@
 
 use super::{lanes, larger};
 use crate::diagnosis::many::decay;
-use crate::plant::friction::Friction;
-
-/// Share of its level from which on friction has built up: what is missing is nothing beside any noise.
-const BUILT_UP: f64 = 0.99999;
+use crate::plant::friction::{Friction, SLIPS};
 
 /// How friction has built up on the way of each table.
 #[derive(Clone, Copy)]
@@ -46,8 +43,8 @@ impl<const N: usize> Bristles<N> {
 
     /// Torque of each as long as it goes on one way, where all have built up as far as they will: that of dry friction.
     #[inline(always)]
-    pub(super) fn built_up(&self, speed: [f64; N], level: [f64; N]) -> Option<[f64; N]> {
-        let mut built_up = true;
+    pub(super) fn slipping(&self, speed: [f64; N], level: [f64; N]) -> Option<[f64; N]> {
+        let mut slips = true;
         let mut torque = [0.0; N];
         for l in 0..N {
             let force = match self {
@@ -55,9 +52,9 @@ impl<const N: usize> Bristles<N> {
                 Self::Other(frictions) => frictions[l].bristle.force,
             };
             torque[l] = level[l].copysign(speed[l]);
-            built_up &= force * 1.0f64.copysign(speed[l]) >= BUILT_UP * level[l];
+            slips &= force * 1.0f64.copysign(speed[l]) >= SLIPS * level[l];
         }
-        built_up.then_some(torque)
+        slips.then_some(torque)
     }
 
     /// Torque after each was moved so far at its level, with the bristles left where they are.
@@ -136,6 +133,27 @@ mod tests {
                     assert!((own - moved[l]).abs() < 1e-8, "{law:?}, step {step}: {own} is not {}", moved[l]);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn bristles_slip_where_all_have_built_up_and_go_on() {
+        let of_elements = BristleLaw { exponent: 0.4, of_elements: true, micro_damping_s: 0.0 };
+        for law in [BristleLaw::default(), BristleLaw { exponent: 1.4, ..BristleLaw::default() }, of_elements] {
+            let each: [Friction; 4] = lanes_of(|l| Friction::new(50.0 + 20.0 * l as f64, law));
+            let mut bristles = Bristles::new(each);
+            let (level, forward, one_turns) = ([1.0, 2.0, 0.5, 1.0], [1.0; 4], [1.0, 1.0, -1.0, 1.0]);
+            assert_eq!(bristles.slipping(forward, level), None, "{law:?}");
+            for _ in 0..20_000 {
+                bristles.moved([0.01; 4], level);
+            }
+            assert_eq!(bristles.slipping(forward, level), Some(level), "{law:?}");
+            // What dry friction makes in place of the bristles, these would have made.
+            let moved = bristles.after([0.01; 4], level);
+            assert!(moved.iter().zip(level).all(|(moved, level)| (moved / level - 1.0).abs() < 2.0 * (1.0 - SLIPS)));
+            assert_eq!(bristles.slipping(one_turns, level), None, "{law:?}");
+            // A level that has risen has yet to be reached.
+            assert_eq!(bristles.slipping(forward, [1.0, 2.0, 0.51, 1.0]), None, "{law:?}");
         }
     }
 

@@ -123,62 +123,66 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         bristles: Option<&mut Bristles<N>>,
     ) -> [[f64; N]; 2] {
         let resisting = self.resisting_tables(row);
-        let dry: [f64; N] = lanes(|l| self.mobility[l] * resisting.friction[l]);
-        match bristles {
+        let at = (row, yielding, &resisting);
+        let Some(bristles) = bristles else {
             // Dry friction takes what speed it can, and never turns it.
-            None => self.stepping(
-                row,
-                yielding,
+            let dry: [f64; N] = lanes(|l| self.mobility[l] * resisting.friction[l]);
+            return self.stepping(
+                at,
                 state,
-                &resisting,
                 #[inline(always)]
                 |free, _| lanes(|l| larger(smaller(free[l], dry[l]), -dry[l])),
-            ),
-            Some(bristles) => {
-                // In most rows all slide on one way, and what has built up is dry friction.
-                if let Some(built_up) = bristles.built_up(state.speed, resisting.level) {
-                    let (before, rubbed) = (*state, lanes(|l| self.mobility[l] * self.share[l] * built_up[l]));
-                    let goes_on = |v: &[f64; N]| (0..N).fold(true, |all, l| all & (v[l] * built_up[l] >= 0.0));
-                    let mut all_go_on = true;
-                    let shares = self.stepping(
-                        row,
-                        yielding,
-                        state,
-                        &resisting,
-                        #[inline(always)]
-                        |_, v| {
-                            all_go_on &= goes_on(&v);
-                            rubbed
-                        },
-                    );
-                    if all_go_on && goes_on(&state.speed) {
-                        return shares;
-                    }
-                    *state = before;
-                }
-                self.stepping(
-                    row,
-                    yielding,
-                    state,
-                    &resisting,
-                    #[inline(always)]
-                    |_, v| {
-                        let torque = bristles.moved(lanes(|l| self.step_s * v[l]), resisting.level);
-                        lanes(|l| self.mobility[l] * self.share[l] * torque[l])
-                    },
-                )
-            }
+            );
+        };
+        if let Some(shares) = self.slipping(at, state, bristles) {
+            return shares;
         }
+        self.stepping(
+            at,
+            state,
+            #[inline(always)]
+            |_, v| {
+                let torque = bristles.moved(lanes(|l| self.step_s * v[l]), resisting.level);
+                lanes(|l| self.mobility[l] * self.share[l] * torque[l])
+            },
+        )
+    }
+
+    /// The same where all slide on one way and friction has built up, as in most rows: then it is dry friction, and bristles stay as they
+    /// are. `None` where one does not, with the tables where they were.
+    #[inline(always)]
+    fn slipping(
+        &self,
+        at: (usize, Giving, &Resisting<N>),
+        state: &mut State<N>,
+        bristles: &Bristles<N>,
+    ) -> Option<[[f64; N]; 2]> {
+        let torque = bristles.slipping(state.speed, at.2.level)?;
+        let (before, rubbed) = (*state, lanes(|l| self.mobility[l] * self.share[l] * torque[l]));
+        let goes_on = |v: &[f64; N]| (0..N).fold(true, |all, l| all & (v[l] * torque[l] >= 0.0));
+        let mut all_go_on = true;
+        let shares = self.stepping(
+            at,
+            state,
+            #[inline(always)]
+            |_, v| {
+                all_go_on &= goes_on(&v);
+                rubbed
+            },
+        );
+        if all_go_on && goes_on(&state.speed) {
+            return Some(shares);
+        }
+        *state = before;
+        None
     }
 
     /// The same by what `rub` takes off the speeds that the tables would have, from those that they had.
     #[inline(always)]
     fn stepping(
         &self,
-        row: usize,
-        yielding: Giving,
+        (row, yielding, resisting): (usize, Giving, &Resisting<N>),
         state: &mut State<N>,
-        resisting: &Resisting<N>,
         mut rub: impl FnMut([f64; N], [f64; N]) -> [f64; N],
     ) -> [[f64; N]; 2] {
         let way = self.way(row);
