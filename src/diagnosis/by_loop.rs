@@ -350,15 +350,15 @@ pub(in crate::diagnosis) mod tests {
 
     /// What a recorder sees of the rig with effects, behind an encoder of this grid.
     pub(in crate::diagnosis) fn recorded(effects: &[Effect], grid_um: f64) -> Excerpt {
-        recorded_over("test", effects, grid_um)
+        recorded_over("test", effects, [grid_um, 0.3])
     }
 
-    /// The same of other moves.
-    fn recorded_over(moves: &str, effects: &[Effect], grid_um: f64) -> Excerpt {
+    /// The same of other moves, with this grid, µm, and this noise of the torque, N·m.
+    pub(in crate::diagnosis) fn recorded_over(moves: &str, effects: &[Effect], sensors: [f64; 2]) -> Excerpt {
         let reach = Reach { start: 20.0, stroke: 200.0, speed: 250.0, acceleration: 2500.0 };
         let mut command = Moves::built_in(moves, &reach).unwrap().command(1e-3);
         command.truncate(20_000);
-        let sensors = Sensors { grid_um, torque_noise: 0.3, ..Sensors::default() };
+        let sensors = Sensors { grid_um: sensors[0], torque_noise: sensors[1], ..Sensors::default() };
         let truth = rig().with_effects(effects.to_vec());
         let trace = simulate(&truth, &command, &Setup { seed: 1, sensors, ..Setup::default() }).unwrap();
         let columns = vec![
@@ -454,7 +454,7 @@ pub(in crate::diagnosis) mod tests {
     #[test]
     fn friction_that_rises_only_where_the_axis_creeps_is_told() {
         let hidden = Effect::StribeckFriction { torque: 0.5, velocity_mm_s: 1.0, exponent: 2.0 };
-        let told = told_beside(&[], &recorded_over("sweep", &[hidden], 0.05));
+        let told = told_beside(&[], &recorded_over("sweep", &[hidden], [0.05, 0.3]));
         let [Effect::StribeckFriction { torque, velocity_mm_s, .. }] = told.as_slice() else { panic!("{told:?}") };
         assert!((torque / 0.5 - 1.0).abs() < 0.1 && (velocity_mm_s - 1.0).abs() < 0.1, "{told:?}");
     }

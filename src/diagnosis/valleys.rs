@@ -70,35 +70,54 @@ fn without_hair_of_play(bench: &Bench, laws: &[&'static Law], fit: Fit, at: usiz
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::by_loop::tests::{clearance, recorded, rig};
+    use crate::diagnosis::by_loop::tests::{clearance, recorded_over, rig};
     use crate::diagnosis::causes::{LAWS, law};
     use crate::diagnosis::frame::Frame;
     use crate::diagnosis::known::Known;
 
-    /// What becomes of a clearance with these numbers where this is hidden.
-    fn settled_from(hidden: Effect, shape: [f64; 4]) -> Cause {
-        let excerpt = recorded(&[hidden], 0.05);
+    /// A set of one law that begins there, refined, and what becomes of it where these are hidden under this noise of the torque, N·m.
+    fn settled_from(hidden: &[Effect], noise: f64, law: &'static Law, shape: &[f64]) -> [(Cause, Vec<f64>); 2] {
+        let excerpt = recorded_over("test", hidden, [0.05, noise]);
         let (columns, axis) = (excerpt.columns.as_ref().unwrap().clone().thinned(), rig());
         let frame = Frame::new(&axis, &columns, None);
         let bench = Bench::new(&frame, &Known::of(&axis, &frame));
-        let begun = bench.fit(bench.parts(law(Cause::Backlash), vec![shape.to_vec()]));
+        let begun = bench.fit(bench.parts(law, vec![shape.to_vec()]));
         let found = bench.refine(begun, 0, 8);
         let watch = Watch::new(&|_, _| true);
-        settled(&bench, LAWS, found, &watch).unwrap().parts[0].law.cause
+        let there = settled(&bench, LAWS, found.clone(), &watch).unwrap();
+        [found, there].map(|fit| (fit.parts[0].law.cause, fit.parts[0].shape.clone()))
+    }
+
+    /// A spring at 60 Hz of a table with this share of the mass.
+    fn spring(share: f64) -> Effect {
+        let omega = std::f64::consts::TAU * 60.0;
+        Effect::DriveCompliance {
+            resonance_hz: 60.0,
+            stiffness_n_um: omega * omega * rig().base.inertia * share * (1.0 - share)
+                / rig().drive.motor_stiffness(1.0),
+            table_inertia_share: share,
+            table_friction_share: 0.5,
+            damping_ratio: 0.06,
+        }
     }
 
     #[test]
     fn flanks_with_a_hair_of_play_are_a_spring_and_a_clearance_stays_one() {
-        let omega = std::f64::consts::TAU * 60.0;
-        let stiffness_n_um = omega * omega * rig().base.inertia * 0.5 * 0.5 / rig().drive.motor_stiffness(1.0);
-        let spring = Effect::DriveCompliance {
-            resonance_hz: 60.0,
-            stiffness_n_um,
-            table_inertia_share: 0.5,
-            table_friction_share: 0.5,
-            damping_ratio: 0.06,
-        };
-        assert_eq!(settled_from(spring, [0.1, 0.5, 0.5, 100.0]), Cause::DriveCompliance);
-        assert_eq!(settled_from(clearance(12.0), [12.0, 0.4, 0.6, 600.0]), Cause::Backlash);
+        let becomes = |hidden, shape: [f64; 4]| settled_from(&[hidden], 0.3, law(Cause::Backlash), &shape)[1].0;
+        assert_eq!(becomes(spring(0.5), [0.1, 0.5, 0.5, 100.0]), Cause::DriveCompliance);
+        assert_eq!(becomes(clearance(12.0), [12.0, 0.4, 0.6, 600.0]), Cause::Backlash);
+    }
+
+    #[test]
+    fn the_mass_behind_a_spring_with_play_is_found_from_the_valley_of_another() {
+        const SHARE: f64 = 0.45;
+        let own_hz = 60.0 * (1.0 - SHARE).sqrt();
+        for heavier in [0.6f64, 1.6, 1.8] {
+            let begun = [20.0, own_hz / heavier.sqrt(), heavier * SHARE, 0.5 / SHARE / heavier, 0.08];
+            let [refined, there] = settled_from(&[spring(SHARE), clearance(20.0)], 0.03, &loose_spring::LAW, &begun);
+            let off = |(_, shape): &(Cause, Vec<f64>)| (shape[2] / SHARE - 1.0).abs();
+            assert!(off(&refined) > 0.05, "{heavier}: {refined:?} is no other valley");
+            assert!(off(&there) < 0.05, "{heavier}: {there:?}");
+        }
     }
 }

@@ -28,6 +28,9 @@ const SWINGS: [f64; 4] = [0.6, 1.0, 1.4, 2.1];
 const WOUND_UP: [f64; 4] = [0.4, 2.5, 6.0, 15.0];
 const MOST_CARRIED: f64 = 0.9;
 
+/// How much heavier the tables of other valleys are.
+const MASSES: [f64; 8] = [0.7, 0.8, 0.88, 0.94, 1.06, 1.13, 1.25, 1.4];
+
 const WIDTH_UM: Scale = Scale::Log(0.1, 2000.0);
 const TABLE: Scale = Scale::Linear(0.04, 0.95, 0.01);
 const DAMPED: Scale = Scale::Log(2e-3, MOST_DAMPING);
@@ -35,11 +38,14 @@ const DAMPED: Scale = Scale::Log(2e-3, MOST_DAMPING);
 /// The two as they are simulated: a clearance whose flanks meet as softly as the spring is. Full width in µm, and the spring in the numbers
 /// of its own law: the table moves by its own frequency and by its friction over its mass, and what the motor feels of that goes with
 /// its mass.
-pub static LAW: Law = of_both(SCALES, Cause::Backlash, both, |frame, shape, _| {
-    // Within three steps of the encoder a turn is no crossing.
-    let crosses = *shape.first()? > 3e3 * frame.grid && half_hz(shape) < 0.95 * FASTEST_HZ;
-    both(frame, shape).filter(|_| crosses && swinging(frame, &shape[1..], &[]).is_some())
-});
+pub static LAW: Law = Law {
+    manner: Manner { valleys: other_masses, ..PLAIN },
+    ..of_both(SCALES, Cause::Backlash, both, |frame, shape, _| {
+        // Within three steps of the encoder a turn is no crossing.
+        let crosses = *shape.first()? > 3e3 * frame.grid && half_hz(shape) < 0.95 * FASTEST_HZ;
+        both(frame, shape).filter(|_| crosses && swinging(frame, &shape[1..], &[]).is_some())
+    })
+};
 
 const SCALES: &[Scale] = &[WIDTH_UM, OWN_HZ, TABLE, RUBBING, DAMPED];
 
@@ -76,6 +82,19 @@ const fn of_both(
         confused_with: &[Cause::PreslidingFriction],
         sentence: |_, _| String::new(),
     }
+}
+
+/// Lighter and heavier tables on the same spring with the same play, under the same friction: what is lost is theirs, too, and the impacts
+/// make the sum of squares rugged over their mass.
+fn other_masses(shape: &[f64]) -> Vec<Vec<f64>> {
+    let &[width_um, own_hz, share, rubbing, damping] = shape else { return Vec::new() };
+    let heavier = MASSES.into_iter().filter(|heavier| share * heavier < MOST_CARRIED);
+    heavier
+        .flat_map(|heavier: f64| {
+            [damping, DAMPING]
+                .map(|damped| vec![width_um, own_hz / heavier.sqrt(), share * heavier, rubbing / heavier, damped])
+        })
+        .collect()
 }
 
 /// The frequency of half of the inertia on the spring, Hz.
@@ -205,4 +224,32 @@ pub fn with_little_play(frame: &Frame, spring: &TwoMasses) -> Option<Vec<Vec<f64
         vec![width_um, own_hz / softer.sqrt(), share, rubbing, damping]
     };
     Some([1.0 - LITTLE_PLAY, 1.0].map(with).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::by_loop::tests::{recorded, rig};
+
+    #[test]
+    fn tables_of_other_masses_hang_on_the_same_spring_under_the_same_friction() {
+        let (excerpt, axis) = (recorded(&[], 0.05), rig());
+        let frame = Frame::new(&axis, excerpt.columns.as_ref().unwrap(), None);
+        let shape = [12.0, 44.0, 0.45, 1.2, 0.1];
+        let masses = |shape: &[f64]| table_side::split(&frame, both(&frame, shape)).unwrap();
+        let (own, others) = (masses(&shape), other_masses(&shape));
+        assert!(others.len() > 8);
+        for other in others {
+            let it = masses(&other);
+            for (a, b) in [
+                (it.stiffness, own.stiffness),
+                (it.clearance, own.clearance),
+                (it.table_friction_share, own.table_friction_share),
+                (lost(&frame, &it), lost(&frame, &own)),
+            ] {
+                assert!((a / b - 1.0).abs() < 1e-9, "{other:?}: {a} {b}");
+            }
+            assert!((other[2] / shape[2] - 1.0).abs() > 0.05, "{other:?} is the same table");
+        }
+    }
 }
