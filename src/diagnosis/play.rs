@@ -26,13 +26,10 @@ const SOFT_HZ: f64 = 300.0;
 /// Share of its squares that a spring must come down to with a little play for more to be tried, and of those that a set leaves on the
 /// first sums where that cannot be asked of friction that builds up.
 const LESS: f64 = 0.97;
-/// The same without that friction. Where it stands in for the spring of a clearance, both without it leave up to twice as much on
-/// those sums, where a rest of the table is off that neither knows of, and far less on the rows; where it is there, sixty times and more.
-const MUCH_MORE: f64 = 10.0;
+/// Excess over the noise floor (in variance) above which a spring leaves twice the noise.
+const MUCH_LEFT: f64 = 3.0;
 /// How hard flanks meet that both are compared with, Hz.
 const HARD_HZ: [f64; 3] = [900.0, 450.0, 220.0];
-/// Ways over which friction builds up beside a clearance that is wider by the rest, over that beside both.
-const LESS_BUILT_UP: [f64; 3] = [0.9, 0.8, 0.7];
 /// What is said meanwhile.
 const STAGE: &str = "looking for play in a spring";
 
@@ -71,35 +68,12 @@ pub fn added(bench: &Bench, laws: &[&'static Law], fit: Fit, watch: &Watch) -> R
 /// The same with flanks that meet so hard in the place of the spring.
 fn with_hard_flanks(bench: &Bench, both: &Fit, hz: f64) -> Option<Fit> {
     let at = both.table()?;
-    let beside = bench.without(both, at);
-    let part = &both.parts[at];
-    // Both have been looked for in several valleys.
-    let valleys = std::iter::once(part.shape.clone()).chain((part.law.manner.valleys)(&part.shape));
-    let hard: Vec<Vec<f64>> = valleys.filter_map(|shape| loose_spring::with_hard_flanks(&shape, hz)).collect();
-    let resistance = bench.resistance_of(both);
-    let started = |(others, shapes): (Vec<Part>, Vec<Vec<f64>>)| {
-        let own = bench.parts_under(law(Cause::Backlash), shapes, &resistance).into_iter();
-        own.map(move |own| bench.fit(others.iter().cloned().chain([own]).collect())).collect::<Vec<_>>()
-    };
-    let wider = hard.first().into_iter().flat_map(|clearance| wider(bench, &beside, clearance)).collect::<Vec<_>>();
-    let starts = wider.into_iter().chain([(beside.parts.clone(), hard)]).flat_map(started);
-    let start = starts.min_by(|a, b| price(a).total_cmp(&price(b)))?;
-    let fit = bench.refine(bench.refine_roughly(start, beside.parts.len(), STEPS[0]), 0, STEPS[1]);
+    let shape = loose_spring::with_hard_flanks(&both.parts[at].shape, hz)?;
+    let others: Vec<Part> = bench.without(both, at).parts;
+    let own = bench.parts_under(law(Cause::Backlash), vec![shape], &bench.resistance_of(both));
+    let start = bench.fit(others.iter().cloned().chain(own).collect());
+    let fit = bench.refine(bench.refine_roughly(start, others.len(), STEPS[0]), 0, STEPS[1]);
     is_sound(bench, &fit).then_some(fit)
-}
-
-/// Wider clearances beside friction that builds up over less: one takes over at a turn what the other does.
-fn wider(bench: &Bench, beside: &Fit, clearance: &[f64]) -> Vec<(Vec<Part>, Vec<Vec<f64>>)> {
-    let with = |first: f64, shape: &[f64]| std::iter::once(first).chain(shape[1..].iter().copied()).collect::<Vec<_>>();
-    let built_up = beside.parts.iter().position(|part| part.law.manner.turns_table);
-    let traded = |(at, less): (usize, f64)| {
-        let (mut others, part) = (beside.parts.clone(), &beside.parts[at]);
-        let way_um = part.shape[0];
-        others[at] = bench.parts(part.law, vec![with(less * way_um, &part.shape)]).pop()?;
-        // Either way of the table.
-        Some((others, vec![with(clearance[0] + 2.0 * (1.0 - less) * way_um, clearance)]))
-    };
-    built_up.into_iter().flat_map(|at| LESS_BUILT_UP.map(|less| (at, less))).filter_map(traded).collect()
 }
 
 /// Whether a table is behind a spring, or behind flanks that meet as if they were one.
@@ -121,10 +95,11 @@ fn in_its_place(bench: &Bench, found: &Fit, set: &Fit, watch: &Watch) -> Result<
     let with = |own: Part| bench.fit(others.iter().cloned().chain([own]).collect());
     // A spring that has play leaves less with a little of it, once its other numbers have made room for that.
     let whole = set.parts.len() == found.parts.len();
-    let little = loose_spring::with_little_play(bench.frame, &masses).filter(|_| whole);
+    // One that leaves much has gone far astray by what the play does, and no little of it helps.
+    let astray = Excess::of(bench, found, found).largest() > MUCH_LEFT;
+    let little = loose_spring::with_little_play(bench.frame, &masses).filter(|_| whole && !astray);
     // Tables beside friction that builds up take long, and leave much for other reasons.
-    let built_up = |set: &Fit| set.parts.iter().any(|part| part.law.manner.turns_table);
-    let in_doubt = (little.is_none() && built_up(found)).then_some(if built_up(set) { LESS } else { MUCH_MORE });
+    let in_doubt = little.is_none() && found.parts.iter().any(|part| part.law.manner.turns_table);
     if let Some(little) = little {
         let starts = bench.parts_under(&loose_spring::LAW, little, &resistance).into_iter().map(with);
         let Some(start) = starts.min_by(|a, b| a.squares().total_cmp(&b.squares())) else { return Ok(None) };
@@ -140,7 +115,7 @@ fn in_its_place(bench: &Bench, found: &Fit, set: &Fit, watch: &Watch) -> Result<
     let lost =
         watch.each(&starts, (0.9, 0.9), STAGE, |shapes| approached(&first, &loose_spring::LOST, shapes.clone()))?;
     let Some((left, lost)) = lost.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0)) else { return Ok(None) };
-    if in_doubt.is_some_and(|most| left > most * first.0.again(found).squares()) {
+    if in_doubt && left > LESS * first.0.again(found).squares() {
         return Ok(None);
     }
     let mut there = loose_spring::losing(bench.frame, &lost);

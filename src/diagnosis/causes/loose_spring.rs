@@ -230,6 +230,25 @@ pub fn with_little_play(frame: &Frame, spring: &TwoMasses) -> Option<Vec<Vec<f64
 mod tests {
     use super::*;
     use crate::diagnosis::by_loop::tests::{recorded, rig};
+    use crate::diagnosis::fit::Bench;
+    use crate::diagnosis::known::Known;
+
+    /// Also where a law says nothing of them, or only some: what is simulated is what they move.
+    #[test]
+    fn every_number_moves_what_is_simulated() {
+        let (excerpt, axis) = (recorded(&[], 0.05), rig());
+        let frame = Frame::new(&axis, excerpt.columns.as_ref().unwrap(), None);
+        let bench = Bench::new(&frame, &Known::of(&axis, &frame));
+        let spring = vec![12.0, 44.0, 0.45, 1.2, 0.1];
+        for (law, shape) in
+            [(&LAW, &spring), (&LOST, &vec![60.0, 0.3, 0.4, 0.5, 0.1]), (&SAID[0], &spring), (&SAID[1], &spring)]
+        {
+            let slopes = bench.slopes(&bench.fit(bench.parts(law, vec![shape.clone()])), 0);
+            let moved = slopes.iter().filter(|slope| slope.column.iter().any(|value| *value != 0.0));
+            let indices: Vec<usize> = moved.map(|slope| slope.index).collect();
+            assert_eq!(indices, [0, 1, 2, 3, 4], "of {shape:?}");
+        }
+    }
 
     #[test]
     fn tables_of_other_masses_hang_on_the_same_spring_under_the_same_friction() {

@@ -212,6 +212,16 @@ impl Law {
         (self.effect)(frame, shape, coefficients).filter(Effect::is_allowed)
     }
 
+    /// What is simulated with these parameters, also where it is said otherwise or is beyond physical bounds; `None` of a law that is
+    /// worked out row by row.
+    #[must_use]
+    pub fn simulated(&self, frame: &Frame, shape: &[f64]) -> Option<Effect> {
+        match self.terms {
+            Terms::Simulated(effect) => effect(frame, shape),
+            _ => None,
+        }
+    }
+
     /// Whether the traces are a simulation of what happens between the rows.
     #[must_use]
     pub fn is_simulated(&self) -> bool {

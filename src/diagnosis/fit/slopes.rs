@@ -179,10 +179,10 @@ impl Bench<'_, '_> {
         moves.into_iter().map_while(side).collect()
     }
 
-    /// Whether a part has another effect with one of its parameters at this value; what no simulation shows has.
+    /// Whether another thing is simulated of a part with one of its parameters at this value; what no simulation shows has.
     fn makes_another(&self, part: &Part, index: usize, value: f64) -> bool {
-        let effect = |shape: &[f64]| part.law.effect(self.frame, shape, &[]);
-        !part.law.is_simulated() || effect(&part.shape_with(index, value)) != effect(&part.shape)
+        let simulated = |shape: &[f64]| part.law.simulated(self.frame, shape);
+        !part.law.is_simulated() || simulated(&part.shape_with(index, value)) != simulated(&part.shape)
     }
 
     /// The same fit where no parameter of a simulated table stands beyond where it changes something.
