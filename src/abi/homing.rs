@@ -64,7 +64,7 @@ fn refusable(handle: &mut GibHoming, call: impl FnOnce(&mut Homing) -> Result<()
 
 /// Bytes that an instance needs in memory of your own, to be aligned to 16.
 ///
-/// @return the size in bytes, about 67 KiB.
+/// @return the size in bytes, about 78 KiB.
 ///
 /// [thread: any] [real-time: yes] [state: any]
 #[unsafe(no_mangle)]

@@ -57,21 +57,24 @@ pub struct HomingConfig {
     /// The torque counts as limiting within this of the limit, and beyond the limit by this it is a fault, N·m;
     /// 1 to 30 % of the limit (default 10 %).
     pub torque_tolerance_nm: f64,
-    /// The axis stands when slower than this, 1e-6 mm/s to the approach speed (default a fifth of the touch speed, 0.05 at least).
+    /// The axis stands when slower than this, 1e-6 mm/s to the approach speed (default a fifth of the touch speed, 0.05 at least, no more than
+    /// the approach speed).
     pub detection_velocity_mm_s: f64,
-    /// Time for which the torque must be limiting and the axis stand, 8 cycles to 5 s (default 0.1).
+    /// Time for which the torque must be limiting and the axis stand, 8 cycles to 5 s (default 0.1, 8 cycles at least).
     pub detection_time_s: f64,
     /// Smallest way from the start to the stop, 0 (default) to `distance_max_mm`: a stop before it is a fault.
     pub distance_min_mm: f64,
     /// Largest way that the axis may go toward the stop from where it stands at the start, 0.001 to 100000 mm. Required.
     pub distance_max_mm: f64,
-    /// Time for the whole homing, a cycle to 100000 s (default: what its ways take, twice, and 10 s).
+    /// Time for the whole homing, a cycle to 100000 s (default: what its ways take, twice, and 10 s, as far as that is
+    /// allowed).
     pub time_limit_s: f64,
     /// Largest |target - position|, 0.001 to 100 mm (default 1 mm and the way of 0.1 s).
     pub lag_limit_mm: f64,
     /// Coordinate of the place where the axis stands when homed, -1e6 to 1e6 mm (default 0).
     pub set_position_mm: f64,
-    /// Way from the contact point to that place, away from the stop, 0 (default) to 1000 mm.
+    /// Way from the contact point to that place, away from the stop, 0 (default) to 1000 mm. There the axis must come within a tenth of
+    /// `press_max_mm` of its command, or without torque within half of its way, in ten detection times, else `GIB_ERR_LAG`.
     pub zero_offset_mm: f64,
     /// Speed of that move, 0.01 to 500 mm/s (default: the approach speed).
     pub zero_offset_speed_mm_s: f64,

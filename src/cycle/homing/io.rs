@@ -55,8 +55,8 @@ pub const GIB_HOMING_REQUEST_SET_POSITION: u32 = 4;
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct HomingInput {
-    /// Motor position in load units, mm, in the coordinate of the start; from the request to set the position on, either in that or
-    /// with `shift_mm` added.
+    /// Motor position in load units, mm, in the coordinate of the start; from the request to set the position on, in any cycle either in
+    /// that or with `shift_mm` added.
     pub position_mm: [f64; 2],
     /// Motor torque, positive toward positive positions unless `torque_inverted`, in the unit of the configuration.
     pub torque: [f64; 2],
@@ -74,7 +74,8 @@ pub struct HomingInput {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct HomingOutput {
-    /// Commanded motor positions, mm. To be followed while `owns_motion` is 1.
+    /// Commanded motor positions, mm, in the coordinate of the start. To be followed while `owns_motion` is 1, in that coordinate also
+    /// when `shift_mm` has been added to the positions told: the axis does not move by being told where it is.
     pub target_position_mm: [f64; 2],
     /// Commanded speeds, mm/s, signed.
     pub target_speed_mm_s: [f64; 2],

@@ -23,6 +23,8 @@ mod quick;
 mod quick_tests;
 mod resting;
 mod sequence;
+#[cfg(test)]
+mod set_tests;
 mod way_out;
 
 /// Where the machine is. Each comment says what ends the state.
@@ -93,6 +95,8 @@ pub struct Homing {
     in_force: u64,
     /// True while the drive runs with a limit that gib has changed and not put right.
     changed: bool,
+    /// The kernel has been asked to set the position: what it tells may have the shift added.
+    placing: bool,
     output: HomingOutput,
     sides: [Side; 2],
 }
@@ -119,6 +123,7 @@ impl Default for Homing {
             old_limit: 0.0,
             in_force: 0,
             changed: false,
+            placing: false,
             output: HomingOutput::default(),
             sides: [Side::default(), Side::default()],
         }
@@ -151,6 +156,7 @@ impl Homing {
         self.output.shift_mm = [0.0; 2];
         self.output.stop_drive = 0;
         self.in_force = 0;
+        self.placing = false;
         self.enter(Phase::Begin, 2.0);
         Ok(())
     }
@@ -252,6 +258,7 @@ impl Homing {
         self.output.new_events = 0;
         match self.phase {
             Phase::Idle | Phase::Done | Phase::Failed => self.rest(input),
+            _ if self.placing => self.place(input),
             Phase::Stopping | Phase::Unload | Phase::Relieve | Phase::Restore => self.exit(input),
             _ => self.work(input),
         }
@@ -375,13 +382,12 @@ impl Homing {
         for (i, side) in self.sides.iter().enumerate().take(self.plan.motors) {
             let (position, torque) = (input.position_mm[i], input.torque[i]);
             let finite = position.is_finite() && torque.is_finite();
-            // Before the first cycle there is no command to lag behind; at the end the kernel may have shifted already.
-            let shifted = self.phase == Phase::Set && side.safe(&self.plan, position - self.output.shift_mm[i], torque);
+            // Before the first cycle there is no command to lag behind.
             // The deviation of a pressed motor is dropped, and its torque with it.
             let sprung = matches!(self.phase, Phase::Clear | Phase::Evaluate)
                 && self.touch >= self.plan.touches
                 && side.springs_back(&self.plan, position, torque, self.touches[i & 1].press(&self.plan));
-            let placed = finite && (self.phase == Phase::Begin || shifted || sprung);
+            let placed = finite && (self.phase == Phase::Begin || sprung);
             if !placed && !side.safe(&self.plan, position, torque) {
                 return Some(side.name_danger(&self.plan, position, torque));
             }

@@ -146,9 +146,10 @@ impl Plan {
         let tolerance_nm = in_range("torque_tolerance_nm\0", or(c.torque_tolerance_nm, 0.1 * limit_nm), least, most)?;
         let approach = in_range("approach_speed_mm_s\0", or(c.approach_speed_mm_s, 1.0), 0.01, 100.0)?;
         let touch = in_range("touch_speed_mm_s\0", or(c.touch_speed_mm_s, approach.min(1.0)), 0.01, approach)?;
-        let slow = or(c.detection_velocity_mm_s, (0.2 * touch).max(0.05));
+        let slow = or(c.detection_velocity_mm_s, (0.2 * touch).max(0.05).min(approach));
         let slow = in_range("detection_velocity_mm_s\0", slow, 1e-6, approach)?;
-        let detection_s = in_range("detection_time_s\0", or(c.detection_time_s, 0.1), 8.0 * cycle, 5.0)?;
+        let detection_s =
+            in_range("detection_time_s\0", or(c.detection_time_s, (8.0 * cycle).max(0.1)), 8.0 * cycle, 5.0)?;
         let far = in_range("distance_max_mm\0", c.distance_max_mm, 1e-3, 1e5)?;
         let offset = in_range("zero_offset_mm\0", c.zero_offset_mm, 0.0, 1000.0)?;
         let offset_speed = or(c.zero_offset_speed_mm_s, approach);
@@ -156,7 +157,7 @@ impl Plan {
         let retract = in_range("retract_mm\0", or(c.retract_mm, 1.0), 0.05, 100.0)?;
         let touches = if c.touches == 0 { 3.0 } else { whole("touches\0", c.touches, 1.0, 10.0)? };
         let motion = far / approach + (touches + 1.0) * (2.0 * retract / touch + detection_s) + offset / offset_speed;
-        let time = in_range("time_limit_s\0", or(c.time_limit_s, 2.0 * motion + 10.0), cycle, 1e5)?;
+        let time = in_range("time_limit_s\0", or(c.time_limit_s, (2.0 * motion + 10.0).min(1e5)), cycle, 1e5)?;
         let lag = in_range("lag_limit_mm\0", or(c.lag_limit_mm, 1.0 + 0.1 * approach), 1e-3, 100.0)?;
         let acceleration = in_range("acceleration_mm_s2\0", or(c.acceleration_mm_s2, 50.0), 0.1, 10000.0)?;
         let timeout = in_range("ack_timeout_s\0", or(c.ack_timeout_s, 1.0), 2.0 * cycle, 60.0)?;

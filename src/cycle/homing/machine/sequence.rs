@@ -5,6 +5,9 @@ use crate::cycle::profile::higher;
 
 /// Cycles after which the filtered torque of an axis at rest is its own.
 const HELD: u32 = 24;
+/// Times as long as after other moves that the axis may take to come to the zero offset: homed is homed where it is, and an integrator
+/// overcomes friction slowly.
+const SETTLES: f64 = 2.5;
 
 impl Homing {
     /// One cycle of the other states under way.
@@ -302,14 +305,29 @@ impl Homing {
             bound = bound.max(self.sides[i].go(&plan, home, plan.offset_speed));
         }
         self.event(GIB_HOMING_EVENT_OFFSET);
-        self.enter(Phase::Offset, bound + plan.settling());
+        self.enter(Phase::Offset, bound + SETTLES * plan.settling());
     }
 
     /// Off the stop: the coordinate is set and the old torque limit given back.
     #[cold]
     fn set(&mut self) {
+        self.placing = true;
         self.request(GIB_HOMING_REQUEST_TORQUE_LIMIT | GIB_HOMING_REQUEST_SET_POSITION, self.old_limit);
         self.enter(Phase::Set, f64::from(self.plan.ack_timeout));
+    }
+
+    /// A cycle from the request to set the position on. Kernels add the shift at once or with their answer, or not at all; the axis has
+    /// not moved by it, and is where it was last, nearly, with the shift taken off or without.
+    #[cold]
+    pub(super) fn place(&mut self, input: &HomingInput) {
+        let mut input = *input;
+        for ((told, shift), side) in input.position_mm.iter_mut().zip(self.output.shift_mm).zip(&self.sides) {
+            let unshifted = *told - shift;
+            if (unshifted - side.position).abs() < (*told - side.position).abs() {
+                *told = unshifted;
+            }
+        }
+        if self.phase == Phase::Set { self.work(&input) } else { self.exit(&input) }
     }
 
     /// Leaves for a fault: without a position to trust no move is safe, a faulted drive makes none, and one that gives more torque than
