@@ -17,6 +17,9 @@ const FROM_HARD_TO_SOFT: [f64; 5] = [900.0, 650.0, 450.0, 300.0, 200.0];
 const STEPS: usize = 5;
 /// Squares over the least up to which a fit counts as alike.
 const ALIKE: f64 = 1.1;
+/// The same of the table's alone, twice the amplitude, where the torque leaves much and the table is known to so many floors.
+const OF_TABLE: f64 = 4.0;
+const KNOWN: f64 = 1.0 + LITTLE_LEFT;
 
 /// The selection with the best of these fits and the contact that predicts best, and the fits that are about as good.
 ///
@@ -43,10 +46,16 @@ pub fn settled(bench: &Bench, held_out: &HeldOut, found: Selection, watch: &Watc
     fits.sort_by(|a, b| a.squares().total_cmp(&b.squares()));
     let best = fits.remove(0);
     fits.retain(|fit| fit.squares() <= ALIKE * best.squares());
-    // Where the best leaves little more than noise, so must what is taken in its place.
+    // Where the best leaves little more than noise, so must what is taken in its place. Nor may a table that is
+    // known be lost for the sake of the torque.
     let rattles = Excess::of(bench, &best, &best).largest() > LITTLE_LEFT;
+    let of_table = |fit: &Fit| fit.channels().get(1).copied().unwrap_or(0.0);
+    let is_alike = |fit: &Fit| match rattles {
+        true => of_table(&best) > KNOWN || of_table(fit) <= OF_TABLE * of_table(&best),
+        false => fit.squares() <= ALIKE * best.squares(),
+    };
     let mut taken = watch.each(&FROM_HARD_TO_SOFT, (0.91, 0.92), stage, |&hz| with_contact(&best, hz))?;
-    taken.retain(|fit| rattles || fit.squares() <= ALIKE * best.squares());
+    taken.retain(is_alike);
     taken.push(best);
     let errors = if taken.len() > 1 { held_out.torque_errors(&taken, stage)? } else { vec![None] };
     let errors: Vec<f64> = errors.into_iter().map(|error| error.unwrap_or(f64::INFINITY)).collect();

@@ -51,6 +51,9 @@ const NO_IMITATION: f64 = 0.05;
 /// 0.08 at least, of 26 with that friction alone 0.04 and less but for two.
 const CONFUSED: f64 = 0.5;
 
+/// Squares of one fit over those of another with the same causes up to which the other is in the same place.
+const AS_DEEP: f64 = 1.01;
+
 /// Squares over those that a set must come down to at which it is not refined any more.
 const FAR_OFF: f64 = 2.0;
 
@@ -132,6 +135,7 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     let mut beam = vec![from];
     let mut best: Vec<Fit> = beam.clone();
     let mut rivals: Vec<Fit> = Vec::new();
+    let mut bottom: Option<Fit> = None;
     for depth in 0..MOST {
         if best.last().is_some_and(|fit| is_lost_in_steps(search.bench, fit)) {
             break;
@@ -147,9 +151,10 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
         }
         // A cause that takes no more off than going to the bottom with those that are there would only stand in for that.
         if let Some(last) = best.last_mut().filter(|last| !first.halves(last)) {
-            let bottom = at_the_bottom(search, last)?;
-            if price(&bottom) <= price(first) {
-                *last = bottom;
+            let there = at_the_bottom(search, last)?;
+            if price(&there) <= price(first) {
+                *last = there;
+                bottom = Some(last.clone());
                 beam = vec![last.clone()];
                 continue;
             }
@@ -169,7 +174,12 @@ fn search_from(search: &Search, from: Fit) -> Result<Selection, Stopped> {
     let fit = shrink(search.bench, start, search.watch)?;
     let fit = waves::fewer(search, fit)?;
     let fit = valleys::settled(search.bench, search.laws, fit, search.watch)?;
-    let mut fit = play::added(search.bench, search.laws, fit, search.watch)?;
+    // At the bottom play has been looked for.
+    let mut fit = match bottom.filter(|bottom| same_causes(bottom, &fit) && bottom.squares() <= AS_DEEP * fit.squares())
+    {
+        Some(_) => fit,
+        None => play::added(search.bench, search.laws, fit, search.watch)?,
+    };
     // What stood in for the play of a spring, or for the spring of a clearance, is not needed beside both.
     if fit.parts.iter().any(loose_spring::is) {
         fit = shrink(search.bench, fit, search.watch)?;
