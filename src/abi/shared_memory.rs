@@ -123,7 +123,7 @@ unsafe fn piece<const N: usize>(from: &mut *const f64, to: &mut *mut f64) {
 /// Copies values from an address each, in pieces as [`copy`].
 ///
 /// # Safety
-/// Each of the `count` addresses at `from` can be read, and `to` written; nobody else in this process uses `to`.
+/// Each of the `count` addresses at `from` is NULL or can be read, and `to` written; nobody else in this process uses `to`.
 #[inline(always)]
 pub unsafe fn gather(from: *const *const f64, count: usize, to: *mut f64) {
     // SAFETY: each place is below `count`, since the pieces add up to it.
@@ -155,8 +155,21 @@ pub unsafe fn gather(from: *const *const f64, count: usize, to: *mut f64) {
 unsafe fn gathered<const N: usize>(from: *const *const f64, to: *mut f64, at: &mut usize) {
     // SAFETY: the caller's promise.
     unsafe {
-        let values: [f64; N] = core::array::from_fn(|i| from.add(*at + i).read().read_volatile());
+        let places: [*const f64; N] = core::array::from_fn(|i| from.add(*at + i).read());
+        // What lies in one process has bits in common: where these are none, NULL may be among them.
+        let common = places.iter().fold(usize::MAX, |common, place| common & place.addr());
+        let values = if common == 0 { present(&places) } else { places.map(|place| place.read_volatile()) };
         to.add(*at).cast::<[f64; N]>().write(values);
     }
     *at += N;
+}
+
+/// The values of `N` addresses of which some may be NULL.
+///
+/// # Safety
+/// As [`gather`].
+#[cold]
+unsafe fn present<const N: usize>(places: &[*const f64; N]) -> [f64; N] {
+    // SAFETY: the caller's promise.
+    places.map(|place| if place.is_null() { f64::NAN } else { unsafe { place.read_volatile() } })
 }
