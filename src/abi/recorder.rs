@@ -29,7 +29,7 @@ pub struct GibRecorderConfig {
     pub capacity_rows: u32,
     /// Servo cycles from row to row, 1 to 1000000 (default 1).
     pub every_cycles: u32,
-    /// Permissions of the shared memory, from 0600 (default: who records may read) to 0666.
+    /// Permissions of the shared memory, to read and write alone, from 0600 (default: who records may read) to 0666.
     pub mode: u32,
     /// Zero.
     pub reserved: u32,

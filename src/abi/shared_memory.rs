@@ -120,6 +120,9 @@ unsafe fn piece<const N: usize>(from: &mut *const f64, to: &mut *mut f64) {
     }
 }
 
+/// What a channel without an address has: no number, an empty cell.
+static NONE: f64 = f64::NAN;
+
 /// Copies values from an address each, in pieces as [`copy`].
 ///
 /// # Safety
@@ -155,21 +158,13 @@ pub unsafe fn gather(from: *const *const f64, count: usize, to: *mut f64) {
 unsafe fn gathered<const N: usize>(from: *const *const f64, to: *mut f64, at: &mut usize) {
     // SAFETY: the caller's promise.
     unsafe {
-        let places: [*const f64; N] = core::array::from_fn(|i| from.add(*at + i).read());
-        // What lies in one process has bits in common: where these are none, NULL may be among them.
-        let common = places.iter().fold(usize::MAX, |common, place| common & place.addr());
-        let values = if common == 0 { present(&places) } else { places.map(|place| place.read_volatile()) };
+        let values: [f64; N] = core::array::from_fn(|i| {
+            let place = from.add(*at + i).read();
+            // An address is chosen and read once: no branch a channel.
+            let place = if place.is_null() { &raw const NONE } else { place };
+            place.read_volatile()
+        });
         to.add(*at).cast::<[f64; N]>().write(values);
     }
     *at += N;
-}
-
-/// The values of `N` addresses of which some may be NULL.
-///
-/// # Safety
-/// As [`gather`].
-#[cold]
-unsafe fn present<const N: usize>(places: &[*const f64; N]) -> [f64; N] {
-    // SAFETY: the caller's promise.
-    places.map(|place| if place.is_null() { f64::NAN } else { unsafe { place.read_volatile() } })
 }
