@@ -994,8 +994,8 @@
 
 /**
  * Reason: the correction is kept, and the spindle turns at another speed than that at which it was learnt, by more than
- * `speed_tolerance_ratio` over `revolutions`: what is left is more than it was. By more than half of that speed, or the other way
- * round, it would do harm, and is out until the speed is back.
+ * `speed_tolerance_ratio` over eight times `revolutions`: what is left is more than it was. By more than half of that speed, or
+ * the other way round, it would do harm, and is out until the speed is back.
  */
 #define GIB_LEARNING_SPEED_CHANGED 8
 
@@ -2972,7 +2972,7 @@ typedef struct gib_recorder_config {
      */
     uint32_t every_cycles;
     /**
-     * Permissions of the shared memory, from 0600 (default: who records may read) to 0666.
+     * Permissions of the shared memory, to read and write alone, from 0600 (default: who records may read) to 0666.
      */
     uint32_t mode;
     /**

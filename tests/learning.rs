@@ -256,7 +256,7 @@ fn a_correction_that_is_kept_is_not_put_on_another_speed() {
         let mut rig = Rig::new(PLAIN, &config());
         assert_eq!(rig.run(200_000), GIB_DONE);
         rig.machine.rpm = rpm;
-        rig.pass(3000);
+        rig.pass(8000);
         let mut most = 0f64;
         for _ in 0..2000 {
             rig.cycle(|_| ());

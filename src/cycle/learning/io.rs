@@ -27,8 +27,8 @@ pub const GIB_LEARNING_BAD_ANGLE: u32 = 2;
 /// Reason: the detected position is no number.
 pub const GIB_LEARNING_NOT_DETECTED: u32 = 4;
 /// Reason: the correction is kept, and the spindle turns at another speed than that at which it was learnt, by more than
-/// `speed_tolerance_ratio` over `revolutions`: what is left is more than it was. By more than half of that speed, or the other way
-/// round, it would do harm, and is out until the speed is back.
+/// `speed_tolerance_ratio` over eight times `revolutions`: what is left is more than it was. By more than half of that speed, or
+/// the other way round, it would do harm, and is out until the speed is back.
 pub const GIB_LEARNING_SPEED_CHANGED: u32 = 8;
 /// Reason: the correction is at its bound.
 pub const GIB_LEARNING_LIMITED: u32 = 16;

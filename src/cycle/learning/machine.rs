@@ -25,7 +25,7 @@ use crate::cycle::turns::{fold, folded};
 use crate::cycle::vibration::harmonic::Harmonics;
 use crate::error::*;
 use quick::Usual;
-use watch::Watch;
+use watch::{KEPT, Watch};
 
 /// Where the machine is. Each comment says what ends the state; those that wait have `wait_s` as their deadline.
 #[derive(Debug, Clone, Copy, PartialEq)]

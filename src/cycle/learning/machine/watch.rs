@@ -3,13 +3,17 @@
 //! deviation at v′, nothing v′/v. So it still helps at other speeds, less and less, and does harm below half of v and the other way
 //! round. Above, where no more is known of the machine, it is trusted as far.
 //!
-//! Speeds are means, over as much as a measurement takes, since a speed may swing; and over an eighth of a turn for what is far off.
+//! Speeds are means, over as much as eight measurements take, or one where the speed is another already, since a speed may swing; and
+//! over an eighth of a turn for what is far off.
 
 use super::*;
 
 /// Relative change of speed beyond which a correction is out.
 const FAR: f64 = 0.5;
-/// Turns over which that is looked at: an encoder's grid of a few degrees must not look like a speed.
+/// Measurements over which a speed that is as it was is compared again: what ends usual cycles costs. They end by themselves where a
+/// speed differs by a tenth.
+pub const KEPT: f64 = 8.0;
+/// Turns over which what is far off is looked at: an encoder's grid of a few degrees must not look like a speed.
 const WINDOW: f64 = 0.125;
 
 /// How the present speed differs from that at which the correction was learnt.
@@ -50,7 +54,7 @@ impl Learning {
         if watch.far {
             watch.strayed = true;
             (self.progress, self.cycles) = (0.0, 0);
-        } else if self.progress >= self.plan.measure {
+        } else if self.progress >= if watch.strayed { self.plan.measure } else { KEPT * self.plan.measure } {
             let mean = (self.progress / self.cycles as f64).copysign(self.rate);
             watch.strayed = (mean - self.speed).abs() > self.plan.speed_tolerance * self.speed.abs();
             (self.progress, self.cycles) = (0.0, 0);
