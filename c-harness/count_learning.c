@@ -1,10 +1,11 @@
 /*
- * Runs learning under callgrind, 256 points and 8 harmonics, and dumps the cost after every step, labelled with the phase,
- * so that `counts` can print instructions per step. See Makefile.
+ * Runs learning under callgrind, 256 points and 8 harmonics or as many as its arguments say, and dumps the cost after every step,
+ * labelled with the phase, so that `counts` can print instructions per step. See Makefile.
  */
 #include "lathe_run.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <valgrind/callgrind.h>
 
 static int32_t run(gib_learning *gib, int cycles, double rpm)
@@ -28,17 +29,18 @@ static int32_t run(gib_learning *gib, int cycles, double rpm)
     return out.status;
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
     lathe_config c = lathe_default();
     gib_learning *gib = gib_learning_new();
     gib_learning_config g = lathe_learning(&c, GIB_LEARNING_FILTERED);
-    g.points = 256;
+    g.points = argc > 1 ? atoi(argv[1]) : 256;
+    g.harmonics = argc > 2 ? atoi(argv[2]) : g.harmonics;
     run(gib, 100, 600.0);
     if (gib_learning_start(gib, &g) != GIB_OK) {
         return 1;
     }
-    int32_t status = run(gib, 12000, 600.0);
+    int32_t status = run(gib, 12000 * (1 + g.points / 512), 600.0); /* more points take more cycles to evaluate */
     gib_learning_abort(gib);
     run(gib, 300, 600.0);
     gib_learning_free(gib);

@@ -192,7 +192,7 @@ int homing_names(homing_fault fault, int32_t first, const homing_branch *b)
         [FAULT_NONE] = {GIB_DONE},
         [FAULT_ABORT] = {GIB_ERR_ABORTED},
         [FAULT_DRIVE_TRIP] = {GIB_ERR_DRIVE_FAULT},
-        [FAULT_FLAG_UNKNOWN] = {GIB_ERR_DRIVE_FAULT},
+        [FAULT_FLAG_UNKNOWN] = {GIB_ERR_CONFIG},
         [FAULT_TORQUE_NAN] = {GIB_ERR_NON_FINITE},
         [FAULT_TORQUE_PLUS_INF] = {GIB_ERR_NON_FINITE},
         [FAULT_TORQUE_MINUS_INF] = {GIB_ERR_NON_FINITE},

@@ -993,7 +993,9 @@
 #define GIB_LEARNING_NOT_DETECTED 4
 
 /**
- * Reason: the speed changed by more than its tolerance; what was measured is not compared.
+ * Reason: the correction is kept, and the spindle turns at another speed than that at which it was learnt, by more than
+ * `speed_tolerance_ratio` over eight times `revolutions`: what is left is more than it was. By more than half of that speed, or
+ * the other way round, it would do harm, and is out until the speed is back.
  */
 #define GIB_LEARNING_SPEED_CHANGED 8
 
@@ -1595,7 +1597,7 @@ typedef struct gib_backlash_input {
      */
     uint32_t acknowledged_id;
     /**
-     * `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`; other bits must be 0.
+     * `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`; other bits must be 0, else `GIB_ERR_CONFIG`.
      */
     uint32_t flags;
 } gib_backlash_input;
@@ -1819,7 +1821,8 @@ typedef struct gib_error_detail {
      */
     double value;
     /**
-     * Smallest value allowed. Where no range applies both bounds are 0.
+     * Smallest value allowed. Where no range applies both bounds are 0: of a number that is odd, or a text of a fit length that is
+     * spelled wrong, whose `value` is then the place of its first wrong character, from 1.
      */
     double low;
     /**
@@ -1859,7 +1862,7 @@ typedef struct gib_calibration_config {
      */
     int32_t reserved;
     /**
-     * The frequencies, rising, 0.5 Hz to a tenth of the cycle frequency. Each is moved by less than half a percent, so
+     * The frequencies, rising by 1 % at least, 0.5 Hz to a tenth of the cycle frequency. Each is moved by less than half a percent, so
      * that whole periods take whole cycles. Required.
      */
     double frequency_hz[GIB_CALIBRATION_POINTS];
@@ -1880,7 +1883,7 @@ typedef struct gib_calibration_config {
      */
     double acceleration_mm_s2;
     /**
-     * Torque that must never be exceeded, N·m. Required.
+     * Torque that must never be exceeded, 1e-6 to 1e6 N·m. Required.
      */
     double torque_bound_nm;
     /**
@@ -1901,7 +1904,9 @@ typedef struct gib_calibration_config {
     double ball_bar_range_um;
     /**
      * What the accelerometers' makers promise of their gain, as a standard deviation, 0.001 to 1 (default 0.1). A gain that is off
-     * by more than three of it is refused.
+     * by more than three of it is refused. It is taken of the complex gain, along and across: where the experiments do not tell a
+     * phase (see `condition_ratio`) it is believed to be 0 within 4 degrees for 0.1, one standard deviation. A sensor that may come
+     * late by more needs more: a cycle is 18 degrees at a twentieth of the cycle frequency, which takes 0.3.
      */
     double tolerance_ratio;
     /**
@@ -1914,7 +1919,7 @@ typedef struct gib_calibration_config {
      */
     double ramp_s;
     /**
-     * Largest |target - position|, up to 100 mm (default the stroke).
+     * Largest |target - position|, 0.0001 to 100 mm (default the stroke).
      */
     double lag_limit_mm;
 } gib_calibration_config;
@@ -1944,7 +1949,7 @@ typedef struct gib_calibration_input {
      */
     double acceleration_m_s2[2];
     /**
-     * `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`; other bits must be 0.
+     * `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`; other bits must be 0, else `GIB_ERR_CONFIG`.
      */
     uint32_t flags;
     /**
@@ -1966,7 +1971,7 @@ typedef struct gib_calibration_output {
      */
     double target_speed_mm_s;
     /**
-     * Present frequency, Hz.
+     * Present frequency, Hz; after GIB_ERR_CALIBRATION_GAIN or _CONDITION the one whose gain was refused, and `point` its number.
      */
     double frequency_hz;
     /**
@@ -2020,7 +2025,8 @@ typedef struct gib_calibration_point {
      */
     double gain_uncertainty_ratio[2];
     /**
-     * Expanded uncertainty of the phase, k = 2, degrees.
+     * Expanded uncertainty of the phase, k = 2, degrees. As far as it rests on `tolerance_ratio` it holds for a sensor that
+     * comes no later than that allows.
      */
     double phase_uncertainty_deg[2];
     /**
@@ -2299,7 +2305,7 @@ typedef struct gib_homing_input {
      */
     uint32_t acknowledged_id;
     /**
-     * `GIB_INPUT_FAULT` (also after a following-error trip), `GIB_INPUT_ABORT`; other bits must be 0.
+     * `GIB_INPUT_FAULT` (also after a following-error trip), `GIB_INPUT_ABORT`; other bits must be 0, else `GIB_ERR_CONFIG`.
      */
     uint32_t flags;
 } gib_homing_input;
@@ -2966,7 +2972,7 @@ typedef struct gib_recorder_config {
      */
     uint32_t every_cycles;
     /**
-     * Permissions of the shared memory, from 0600 (default: who records may read) to 0666.
+     * Permissions of the shared memory, to read and write alone, from 0600 (default: who records may read) to 0666.
      */
     uint32_t mode;
     /**
@@ -3694,7 +3700,7 @@ typedef struct gib_learning_config {
      */
     int32_t updates;
     /**
-     * 1: begin from the correction that this instance holds, learnt before or loaded. 0 (default): from none.
+     * 1: begin from the correction that this instance holds, learnt before or loaded, of as many points; refused without one. 0 (default): from none.
      */
     int32_t resume;
     /**
@@ -3738,7 +3744,8 @@ typedef struct gib_learning_config {
      */
     double speed_min_rpm;
     /**
-     * Relative change of speed beyond which deviations are no longer compared, 0.001 to 0.5 (default 0.02).
+     * Relative change of speed beyond which deviations are no longer compared, 0.001 to 0.5 (default 0.02); of a correction that is
+     * kept it is told, by `GIB_LEARNING_SPEED_CHANGED`.
      */
     double speed_tolerance_ratio;
     /**
@@ -3772,7 +3779,7 @@ typedef struct gib_learning_input {
      */
     double angle_deg;
     /**
-     * `GIB_INPUT_ABORT`, `GIB_INPUT_FAULT`; other bits must be 0. Both fade the correction out.
+     * `GIB_INPUT_ABORT`, `GIB_INPUT_FAULT`; other bits must be 0, else `GIB_ERR_CONFIG`. All fade the correction out.
      */
     uint32_t flags;
     /**
@@ -4575,7 +4582,8 @@ int32_t gib_backlash_start(struct gib_backlash *handle,
  * `gib_backlash_restore` or `_enable` takes its place, and `gib_backlash_last_error` and the report still tell it:
  * GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_ACK_TIMEOUT, GIB_ERR_TORQUE_BOUND,
  * GIB_ERR_TRAVEL_BOUND, GIB_ERR_DEADLINE, GIB_ERR_LAG, GIB_ERR_CONFIG, GIB_ERR_DISABLED, GIB_ERR_BACKLASH_...;
- * and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+ * and GIB_ERR_NULL, GIB_ERR_HANDLE of this call. GIB_ERR_CONFIG is also that of unknown `flags`. Where `input` is NULL a measurement
+ * under way ends as by any other fault: it brakes from this cycle on, and GIB_ERR_NULL is kept. Where `output` is NULL nothing is done.
  *
  * [thread: cycle] [real-time: yes] [state: any]
  *
@@ -4783,7 +4791,9 @@ int32_t gib_calibration_start(struct gib_calibration *handle,
  * @param output commands for this cycle; always written when not NULL.
  * @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
  * GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_TORQUE_BOUND, GIB_ERR_TRAVEL_BOUND, GIB_ERR_LAG,
- * GIB_ERR_CALIBRATION_...; and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+ * GIB_ERR_CALIBRATION_..., GIB_ERR_CONFIG (unknown `flags`); and GIB_ERR_NULL, GIB_ERR_HANDLE of this call. Where `input` is NULL a
+ * calibration under way ends as by any other fault: the amplitude falls from this cycle on, steps return GIB_BUSY meanwhile, then
+ * GIB_ERR_NULL. Where `output` is NULL nothing is done.
  *
  * [thread: cycle] [real-time: yes] [state: any]
  *
@@ -5115,7 +5125,9 @@ int32_t gib_homing_start(struct gib_homing *handle,
  * @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
  * GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_ACK_TIMEOUT, GIB_ERR_TORQUE_BOUND,
  * GIB_ERR_TRAVEL_BOUND, GIB_ERR_DEADLINE, GIB_ERR_LAG, GIB_ERR_HOMING_...;
- * and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+ * GIB_ERR_CONFIG (unknown `flags`); and GIB_ERR_NULL, GIB_ERR_HANDLE of this call. Where `input` is NULL a homing under way ends as
+ * by any other fault: it brakes from this cycle on, what needs a reading waits for one, and GIB_ERR_NULL is kept. Where `output` is
+ * NULL nothing is done.
  *
  * [thread: cycle] [real-time: yes] [state: any]
  *
@@ -5370,7 +5382,9 @@ int32_t gib_learning_start(struct gib_learning *handle,
  * One servo cycle. Call it in every cycle, also when idle: the command is then the target.
  *
  * Command `command_mm` in place of the target. It follows the target at once; the correction in it changes by a bounded
- * step a cycle whatever happens. After GIB_DONE the correction stays in force for as long as you call; an abort takes it out.
+ * step a cycle whatever happens. After GIB_DONE the correction stays in force for as long as you call; an abort takes it out. It is
+ * right for the speed and the sense at which it was learnt: at another speed `reasons` says GIB_LEARNING_SPEED_CHANGED, and beyond half
+ * to one and a half times that speed, or the other way round, it fades out, to come back with the speed.
  *
  * @param handle the instance.
  * @param input target, detected position and angle of this cycle, all of the same instant.
@@ -5378,7 +5392,7 @@ int32_t gib_learning_start(struct gib_learning *handle,
  * @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
  * GIB_ERR_LEARNING_GROWS and GIB_ERR_LEARNING_UPDATES with the best correction in force; GIB_ERR_LEARNING_DEVIATION,
  * GIB_ERR_ABORTED, GIB_ERR_DRIVE_FAULT, GIB_ERR_DEADLINE (the spindle did not turn, or nothing was detected, for `wait_s`)
- * and GIB_ERR_NON_FINITE (the target is no number: the last command is repeated meanwhile) with none; and GIB_ERR_NULL,
+ * GIB_ERR_CONFIG (unknown `flags`) and GIB_ERR_NON_FINITE (the target is no number: the last command is repeated meanwhile) with none; and GIB_ERR_NULL,
  * GIB_ERR_HANDLE of this call. Where `input` is NULL the last command is repeated, and `correction_um` is what is in it.
  *
  * [thread: cycle] [real-time: yes] [state: any]
@@ -5853,15 +5867,15 @@ int32_t gib_recorder_step(struct gib_recorder *handle,
  * is due. Saves a kernel that keeps its signals in places of their own, such as LinuxCNC's pins, to gather them first.
  *
  * @param handle the instance.
- * @param sources where the number of each channel lies now, in the order of the columns; none is NULL. A NaN or an infinity
- * is recorded as an empty cell. Read during this call only.
+ * @param sources where the number of each channel lies now, in the order of the columns. A NaN or an infinity is recorded as
+ * an empty cell, and so is a NULL among them. Read during this call only.
  * @param count addresses at `sources`; must be `channels`.
  * @return as `gib_recorder_step`.
  *
  * [thread: cycle] [real-time: yes] [state: any]
  *
  * # Safety
- * `handle` is NULL or an instance; `sources` is NULL or points to `count` addresses of readable numbers.
+ * `handle` is NULL or an instance; `sources` is NULL or points to `count` addresses, each NULL or of a readable number.
  */
 int32_t gib_recorder_step_from(struct gib_recorder *handle,
                                const double *const *sources,

@@ -167,7 +167,8 @@ fn an_experiment_is_added_only_to_its_like() {
 #[test]
 fn every_way_out_ends_at_rest() {
     type Spoil = fn(&mut CalibrationInput);
-    let faults: [(Spoil, i32, bool); 11] = [
+    let faults: [(Spoil, i32, bool); 12] = [
+        (|i| i.flags = 0x80, GIB_ERR_CONFIG, false),
         (|i| i.flags = 2, GIB_ERR_ABORTED, false),
         (|i| i.torque = f64::NAN, GIB_ERR_NON_FINITE, false),
         (|i| i.ball_bar_um = f64::INFINITY, GIB_ERR_NON_FINITE, false),
@@ -226,4 +227,32 @@ fn a_stuck_or_deaf_sensor_is_named() {
     gib.start(Plan::new(&config(&[20.0]))).unwrap();
     Machine { gain: [-1.0, -1.0], ..Machine::new(0.4) }.run(&mut gib, |_, _, _| ());
     assert_eq!(gib.output().status, GIB_ERR_CALIBRATION_GAIN);
+}
+
+/// A gain that is none: which sensor's, and at which frequency.
+#[test]
+fn the_sensor_and_the_frequency_of_a_gain_are_named() {
+    for (gain, field) in [([-1.0, 1.0], "gain_ratio[0]\0"), ([1.0, -1.0], "gain_ratio[1]\0")] {
+        let mut gib = Calibration::default();
+        for (add, bearing) in [(0, 0.4), (1, 0.15)] {
+            gib.start(Plan::new(&CalibrationConfig { add, tolerance_ratio: 0.3, ..config(&[10.0, 20.0]) })).unwrap();
+            let mut machine = Machine::new(bearing);
+            let turned = Machine { gain, ..Machine::new(bearing) };
+            let mut cycles = 0;
+            while gib.busy() {
+                // Only the second frequency meets the sensor that is turned round.
+                machine.gain = if gib.output().point == 1 { turned.gain } else { [1.0; 2] };
+                let input = machine.answer(gib.output());
+                gib.step(&input);
+                cycles += 1;
+                assert!(cycles < 1_000_000);
+            }
+            if gib.output().status != GIB_DONE {
+                break;
+            }
+        }
+        assert_eq!((gib.output().status, gib.fault().field), (GIB_ERR_CALIBRATION_GAIN, field));
+        assert_eq!(gib.output().point, 1);
+        assert!((gib.output().frequency_hz - 20.0).abs() < 0.1);
+    }
 }

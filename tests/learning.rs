@@ -182,7 +182,8 @@ fn what_is_learnt_is_taken_up_again() {
 #[test]
 fn faults_take_the_correction_out_and_waiting_has_an_end() {
     type Spoil = fn(&mut LearningInput);
-    let faults: [(Spoil, i32); 4] = [
+    let faults: [(Spoil, i32); 5] = [
+        (|i| i.flags = 0x80, GIB_ERR_CONFIG),
         (|i| i.flags = 1, GIB_ERR_DRIVE_FAULT),
         (|i| i.flags = 2, GIB_ERR_ABORTED),
         (|i| i.target_mm = f64::NAN, GIB_ERR_NON_FINITE),
@@ -237,4 +238,111 @@ fn the_correction_goes_and_comes_with_the_spindle() {
         assert!(rpm != 0.0 || rig.output.correction_um == 0.0);
     }
     assert!(rig.rms() < 0.4);
+}
+
+/// A correction that is kept is right near the speed at which it was learnt: elsewhere that is told, and where it would do harm it is
+/// out; with the speed it comes back.
+#[test]
+fn a_correction_that_is_kept_is_not_put_on_another_speed() {
+    for (rpm, reason, out) in [
+        (600.0, false, false),
+        (606.0, false, false),
+        (630.0, true, false),
+        (450.0, true, false),
+        (250.0, true, true),
+        (1000.0, true, true),
+        (-600.0, true, true),
+    ] {
+        let mut rig = Rig::new(PLAIN, &config());
+        assert_eq!(rig.run(200_000), GIB_DONE);
+        rig.machine.rpm = rpm;
+        rig.pass(8000);
+        let mut most = 0f64;
+        for _ in 0..2000 {
+            rig.cycle(|_| ());
+            most = most.max(rig.output.correction_um.abs());
+            assert_eq!((rig.output.status, rig.output.phase), (GIB_DONE, GIB_LEARNING_DONE));
+            assert_eq!(rig.output.reasons, if reason { GIB_LEARNING_SPEED_CHANGED } else { 0 }, "{rpm}");
+        }
+        assert_eq!(most == 0.0, out, "{rpm}: {most} µm");
+        rig.machine.rpm = 600.0;
+        rig.pass(4000);
+        assert!(rig.rms() < 0.4 && rig.output.reasons == 0, "{rpm}");
+    }
+    // An encoder of 200 counts, at two cycles a count and at twenty, is no speed that changes.
+    for rpm in [600.0, 60.0] {
+        let mut rig = Rig::new(Machine { rpm, ..PLAIN }, &LearningConfig { tolerance_um: 1.0, ..config() });
+        let coarse = |i: &mut LearningInput| i.angle_deg = (i.angle_deg / 1.8).floor() * 1.8;
+        for _ in 0..400_000 {
+            rig.cycle(coarse);
+            if !rig.gib.busy() {
+                break;
+            }
+        }
+        assert_eq!(rig.output.status, GIB_DONE, "{:?}", rig.gib.report());
+        for _ in 0..10_000 {
+            rig.cycle(coarse);
+            assert_eq!(rig.output.reasons, 0, "{rpm}");
+        }
+    }
+}
+
+#[test]
+fn what_is_wrong_is_told_by_its_value() {
+    let refused = |config: &LearningConfig| Learning::default().start(Plan::new(config)).unwrap_err();
+    let odd = refused(&LearningConfig { points: 255, ..config() });
+    assert_eq!((odd.field, odd.value, odd.low, odd.high), ("points\0", 255.0, 0.0, 0.0));
+    let none = refused(&LearningConfig { resume: 1, ..config() });
+    assert_eq!((none.field, none.value, none.low, none.high), ("resume\0", 1.0, 0.0, 0.0));
+    let mut rig = Rig::new(PLAIN, &config());
+    rig.pass(100);
+    rig.cycle(|i| i.target_mm = f64::NAN);
+    assert!(rig.gib.fault().value.is_nan() && rig.gib.fault().field == "target_mm\0");
+    rig = Rig::new(PLAIN, &config());
+    rig.pass(100);
+    rig.cycle(|i| i.target_mm = f64::NEG_INFINITY);
+    assert_eq!(rig.gib.fault().value, f64::NEG_INFINITY);
+}
+
+/// The sum of harmonics in single precision may be a little more than their sizes.
+#[test]
+fn what_is_reported_keeps_to_its_bound() {
+    for i in 0..40 {
+        let most = 0.5 + 0.07 * f64::from(i);
+        let learning = LearningConfig { correction_max_um: most, harmonics: 8 - i % 8, updates: 6, ..config() };
+        let mut rig = Rig::new(Machine { rpm: 500.0 + f64::from(i), ..PLAIN }, &learning);
+        for _ in 0..60_000 {
+            rig.cycle(|_| ());
+            assert!(rig.gib.report().correction_um <= most && rig.output.correction_um.abs() <= most, "{i}");
+            if !rig.gib.busy() {
+                break;
+            }
+        }
+        assert!(
+            (0..rig.gib.count())
+                .all(|p| 1e3 * (rig.gib.point(p).command_mm - rig.gib.point(p).target_mm).abs() <= most + 1e-9)
+        );
+    }
+}
+
+/// An abort amid an evaluation, and the correction taken up again: between its points it keeps to the bound, too.
+#[test]
+fn a_correction_that_is_taken_up_again_keeps_to_its_bound() {
+    for cut in [1, 40, 130, 250, 300, 400] {
+        let learning =
+            LearningConfig { correction_max_um: 2.0, points: 16, harmonics: 4, tolerance_um: 0.001, ..config() };
+        let mut rig = Rig::new(Machine { rpm: 120.0, ..PLAIN }, &learning);
+        let mut evaluated = 0;
+        while evaluated < 60 + cut % 40 && rig.gib.busy() {
+            rig.cycle(|_| ());
+            evaluated += u32::from(rig.output.phase == GIB_LEARNING_EVALUATE);
+        }
+        rig.gib.abort();
+        rig.pass(2000);
+        rig.gib.start(Plan::new(&LearningConfig { resume: 1, ..learning })).unwrap();
+        for _ in 0..20_000 {
+            rig.cycle(|_| ());
+            assert!(rig.output.correction_um.abs() <= 2.0, "{cut}: {}", rig.output.correction_um);
+        }
+    }
 }

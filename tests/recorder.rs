@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use gib::abi::recorder::{
     GibRecorder, GibRecorderConfig, gib_recorder_close, gib_recorder_free, gib_recorder_new, gib_recorder_start,
-    gib_recorder_step,
+    gib_recorder_step, gib_recorder_step_from,
 };
 use gib::error::{GIB_BUSY, GIB_OK};
 use gib::recording::Recording;
@@ -252,4 +252,50 @@ fn a_full_disk_leaves_whole_rows() {
         output.status.success() && text.contains("rows over"),
         "the recording must still be readable: {text}{errors}"
     );
+}
+
+/// An address that is NULL is a channel without a number, in each of the pieces that a row is copied in.
+#[test]
+fn a_missing_address_is_an_empty_cell() {
+    for channels in [1u32, 2, 5, 31] {
+        let (name, machine) = (format!("missing-{channels}-{}", std::process::id()), CString::new("rig").unwrap());
+        let columns = (0..channels).map(|i| format!("c{i}")).collect::<Vec<_>>().join(",");
+        let (c_name, columns) = (CString::new(name.clone()).unwrap(), CString::new(columns).unwrap());
+        let config = GibRecorderConfig {
+            struct_size: size_of::<GibRecorderConfig>() as u32,
+            channels,
+            capacity_rows: 64,
+            every_cycles: 1,
+            mode: 0,
+            reserved: 0,
+            cycle_s: 0.001,
+            name: c_name.as_ptr(),
+            machine: machine.as_ptr(),
+            columns: columns.as_ptr(),
+        };
+        let values: Vec<f64> = (0..channels).map(f64::from).collect();
+        let gib = gib_recorder_new();
+        // SAFETY: a live instance; every address is one of `values` or NULL.
+        unsafe {
+            assert_eq!(gib_recorder_start(gib, &config), GIB_OK);
+            for missing in 0..channels as usize {
+                let mut sources: Vec<*const f64> = values.iter().map(|value| value as *const f64).collect();
+                sources[missing] = std::ptr::null();
+                assert_eq!(gib_recorder_step_from(gib, sources.as_ptr(), channels), GIB_BUSY);
+            }
+        }
+        let words = std::fs::read(format!("/dev/shm/gib-{name}")).unwrap();
+        for row in 0..channels as usize {
+            for channel in 0..channels as usize {
+                let at = 8 * (512 + row * (channels as usize + 1) + 1 + channel);
+                let value = f64::from_ne_bytes(words[at..at + 8].try_into().unwrap());
+                assert!(
+                    if row == channel { value.is_nan() } else { value == channel as f64 },
+                    "{row} {channel} {value}"
+                );
+            }
+        }
+        // SAFETY: as above, and nobody uses it after.
+        unsafe { (gib_recorder_close(gib), gib_recorder_free(gib)) };
+    }
 }

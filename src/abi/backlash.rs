@@ -146,7 +146,8 @@ pub unsafe extern "C" fn gib_backlash_start(handle: *mut GibBacklash, config: *c
 /// `gib_backlash_restore` or `_enable` takes its place, and `gib_backlash_last_error` and the report still tell it:
 /// GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_ACK_TIMEOUT, GIB_ERR_TORQUE_BOUND,
 /// GIB_ERR_TRAVEL_BOUND, GIB_ERR_DEADLINE, GIB_ERR_LAG, GIB_ERR_CONFIG, GIB_ERR_DISABLED, GIB_ERR_BACKLASH_...;
-/// and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+/// and GIB_ERR_NULL, GIB_ERR_HANDLE of this call. GIB_ERR_CONFIG is also that of unknown `flags`. Where `input` is NULL a measurement
+/// under way ends as by any other fault: it brakes from this cycle on, and GIB_ERR_NULL is kept. Where `output` is NULL nothing is done.
 ///
 /// [thread: cycle] [real-time: yes] [state: any]
 ///
@@ -194,7 +195,8 @@ extern "C" fn step_in_full(handle: &mut GibBacklash, input: &BacklashInput, outp
     output.status
 }
 
-/// A step without an instance, an input or an output: nothing moves, and the position asked for is the present one.
+/// A step without an instance, an input or an output. Without an input what is under way ends; without an output, which is how
+/// the axis is commanded, nothing is done.
 ///
 /// # Safety
 /// Each is NULL or valid.
@@ -213,14 +215,19 @@ unsafe extern "C" fn misused(
     let position = input.map_or(0.0, |input| input.position_mm);
     if let Some(output) = output {
         *output = match handle {
-            Some(handle) if handle.alive() => *handle.machine.output(),
+            Some(handle) if handle.alive() => {
+                if input.is_none() {
+                    handle.machine.miss();
+                    handle.mark();
+                }
+                *handle.machine.output()
+            }
             _ => BacklashOutput {
                 target_position_mm: if position.is_finite() { position } else { 0.0 },
                 phase: GIB_BACKLASH_FAILED,
                 ..BacklashOutput::default()
             },
         };
-        output.target_speed_mm_s = 0.0;
         output.status = status;
         output.message = status;
     }

@@ -127,7 +127,9 @@ pub unsafe extern "C" fn gib_calibration_start(handle: *mut GibCalibration, conf
 /// @param output commands for this cycle; always written when not NULL.
 /// @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
 /// GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_TORQUE_BOUND, GIB_ERR_TRAVEL_BOUND, GIB_ERR_LAG,
-/// GIB_ERR_CALIBRATION_...; and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+/// GIB_ERR_CALIBRATION_..., GIB_ERR_CONFIG (unknown `flags`); and GIB_ERR_NULL, GIB_ERR_HANDLE of this call. Where `input` is NULL a
+/// calibration under way ends as by any other fault: the amplitude falls from this cycle on, steps return GIB_BUSY meanwhile, then
+/// GIB_ERR_NULL. Where `output` is NULL nothing is done.
 ///
 /// [thread: cycle] [real-time: yes] [state: any]
 ///
@@ -151,20 +153,26 @@ pub unsafe extern "C" fn gib_calibration_step(
     }
 }
 
-/// A step without an instance, an input or an output: nothing moves, and the position asked for is the last, or the present.
+/// A step without an instance, an input or an output. Without an input what is under way ends; without an output, which is how
+/// the axis is commanded, nothing is done.
 #[cold]
 fn misused(
     handle: Option<&mut GibCalibration>,
     input: Option<&CalibrationInput>,
     output: Option<&mut CalibrationOutput>,
 ) -> i32 {
-    let living = handle.as_ref().filter(|handle| handle.alive == ALIVE);
-    let status = if handle.is_some() && living.is_none() { GIB_ERR_HANDLE } else { GIB_ERR_NULL };
+    let dead = handle.as_ref().is_some_and(|handle| handle.alive != ALIVE);
+    let living = handle.filter(|_| !dead);
+    let status = if dead { GIB_ERR_HANDLE } else { GIB_ERR_NULL };
     let place = input.map(|input| input.position_mm).filter(|position| position.is_finite()).unwrap_or(0.0);
     let stand = CalibrationOutput { target_position_mm: place, phase: GIB_CALIBRATION_FAILED, ..Default::default() };
     if let Some(output) = output {
-        *output = living.map_or(stand, |handle| *handle.machine.output());
-        output.target_speed_mm_s = 0.0;
+        *output = living.map_or(stand, |handle| {
+            if input.is_none() {
+                handle.machine.miss();
+            }
+            *handle.machine.output()
+        });
         output.status = status;
         output.message = status;
     }

@@ -160,7 +160,9 @@ pub unsafe extern "C" fn gib_homing_start(handle: *mut GibHoming, config: *const
 /// @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
 /// GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_ACK_TIMEOUT, GIB_ERR_TORQUE_BOUND,
 /// GIB_ERR_TRAVEL_BOUND, GIB_ERR_DEADLINE, GIB_ERR_LAG, GIB_ERR_HOMING_...;
-/// and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+/// GIB_ERR_CONFIG (unknown `flags`); and GIB_ERR_NULL, GIB_ERR_HANDLE of this call. Where `input` is NULL a homing under way ends as
+/// by any other fault: it brakes from this cycle on, what needs a reading waits for one, and GIB_ERR_NULL is kept. Where `output` is
+/// NULL nothing is done.
 ///
 /// [thread: cycle] [real-time: yes] [state: any]
 ///
@@ -174,7 +176,7 @@ pub unsafe extern "C" fn gib_homing_step(
 ) -> i32 {
     if handle.is_null() || input.is_null() || output.is_null() {
         // SAFETY: the caller promises each is NULL or valid.
-        return unsafe { misused(handle.as_ref(), input.as_ref(), output.as_mut()) };
+        return unsafe { misused(handle.as_mut(), input.as_ref(), output.as_mut()) };
     }
     // SAFETY: as above, and none is NULL.
     let (handle, input, output) = unsafe { (&mut *handle, &*input, &mut *output) };
@@ -279,19 +281,26 @@ extern "C" fn step_from_rest(handle: &mut GibHoming, input: &HomingInput, output
     step_whole(handle, input, output)
 }
 
-/// A step without an instance, an input or an output: nothing moves, and the position asked for is the present one.
+/// A step without an instance, an input or an output. Without an input what is under way ends; without an output, which is how
+/// the axis is commanded, nothing is done.
 #[cold]
-fn misused(handle: Option<&GibHoming>, input: Option<&HomingInput>, output: Option<&mut HomingOutput>) -> i32 {
-    let living = handle.filter(|handle| handle.alive());
-    let status = if handle.is_some() && living.is_none() { GIB_ERR_HANDLE } else { GIB_ERR_NULL };
+fn misused(handle: Option<&mut GibHoming>, input: Option<&HomingInput>, output: Option<&mut HomingOutput>) -> i32 {
+    let dead = handle.as_ref().is_some_and(|handle| !handle.alive());
+    let living = handle.filter(|_| !dead);
+    let status = if dead { GIB_ERR_HANDLE } else { GIB_ERR_NULL };
     let place = |position: f64| if position.is_finite() { position } else { 0.0 };
     let target_position_mm = input.map_or([0.0; 2], |input| input.position_mm.map(place));
     if let Some(output) = output {
         *output = match living {
-            Some(handle) => *handle.machine.output(),
+            Some(handle) => {
+                if input.is_none() {
+                    handle.machine.miss();
+                    handle.mark();
+                }
+                *handle.machine.output()
+            }
             None => HomingOutput { target_position_mm, phase: GIB_HOMING_FAILED, ..HomingOutput::default() },
         };
-        output.target_speed_mm_s = [0.0; 2];
         output.new_events = 0;
         output.status = status;
         output.message = status;

@@ -114,7 +114,9 @@ pub unsafe extern "C" fn gib_learning_start(handle: *mut GibLearning, config: *c
 /// One servo cycle. Call it in every cycle, also when idle: the command is then the target.
 ///
 /// Command `command_mm` in place of the target. It follows the target at once; the correction in it changes by a bounded
-/// step a cycle whatever happens. After GIB_DONE the correction stays in force for as long as you call; an abort takes it out.
+/// step a cycle whatever happens. After GIB_DONE the correction stays in force for as long as you call; an abort takes it out. It is
+/// right for the speed and the sense at which it was learnt: at another speed `reasons` says GIB_LEARNING_SPEED_CHANGED, and beyond half
+/// to one and a half times that speed, or the other way round, it fades out, to come back with the speed.
 ///
 /// @param handle the instance.
 /// @param input target, detected position and angle of this cycle, all of the same instant.
@@ -122,7 +124,7 @@ pub unsafe extern "C" fn gib_learning_start(handle: *mut GibLearning, config: *c
 /// @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
 /// GIB_ERR_LEARNING_GROWS and GIB_ERR_LEARNING_UPDATES with the best correction in force; GIB_ERR_LEARNING_DEVIATION,
 /// GIB_ERR_ABORTED, GIB_ERR_DRIVE_FAULT, GIB_ERR_DEADLINE (the spindle did not turn, or nothing was detected, for `wait_s`)
-/// and GIB_ERR_NON_FINITE (the target is no number: the last command is repeated meanwhile) with none; and GIB_ERR_NULL,
+/// GIB_ERR_CONFIG (unknown `flags`) and GIB_ERR_NON_FINITE (the target is no number: the last command is repeated meanwhile) with none; and GIB_ERR_NULL,
 /// GIB_ERR_HANDLE of this call. Where `input` is NULL the last command is repeated, and `correction_um` is what is in it.
 ///
 /// [thread: cycle] [real-time: yes] [state: any]

@@ -29,7 +29,7 @@ pub struct GibRecorderConfig {
     pub capacity_rows: u32,
     /// Servo cycles from row to row, 1 to 1000000 (default 1).
     pub every_cycles: u32,
-    /// Permissions of the shared memory, from 0600 (default: who records may read) to 0666.
+    /// Permissions of the shared memory, to read and write alone, from 0600 (default: who records may read) to 0666.
     pub mode: u32,
     /// Zero.
     pub reserved: u32,
@@ -276,15 +276,15 @@ pub unsafe extern "C" fn gib_recorder_step(handle: *mut GibRecorder, values: *co
 /// is due. Saves a kernel that keeps its signals in places of their own, such as LinuxCNC's pins, to gather them first.
 ///
 /// @param handle the instance.
-/// @param sources where the number of each channel lies now, in the order of the columns; none is NULL. A NaN or an infinity
-/// is recorded as an empty cell. Read during this call only.
+/// @param sources where the number of each channel lies now, in the order of the columns. A NaN or an infinity is recorded as
+/// an empty cell, and so is a NULL among them. Read during this call only.
 /// @param count addresses at `sources`; must be `channels`.
 /// @return as `gib_recorder_step`.
 ///
 /// [thread: cycle] [real-time: yes] [state: any]
 ///
 /// # Safety
-/// `handle` is NULL or an instance; `sources` is NULL or points to `count` addresses of readable numbers.
+/// `handle` is NULL or an instance; `sources` is NULL or points to `count` addresses, each NULL or of a readable number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn gib_recorder_step_from(
     handle: *mut GibRecorder,
@@ -292,7 +292,7 @@ pub unsafe extern "C" fn gib_recorder_step_from(
     count: u32,
 ) -> i32 {
     let write = |to: *mut f64| {
-        // SAFETY: `count` addresses of readable numbers by the caller's promise, room for them in a row by `step`'s.
+        // SAFETY: `count` addresses, NULL or of readable numbers, by the caller's promise, room for them in a row by `step`'s.
         unsafe { gather(sources, count as usize, to) }
     };
     // SAFETY: the caller's promise; `count` values are written.

@@ -120,10 +120,13 @@ unsafe fn piece<const N: usize>(from: &mut *const f64, to: &mut *mut f64) {
     }
 }
 
+/// What a channel without an address has: no number, an empty cell.
+static NONE: f64 = f64::NAN;
+
 /// Copies values from an address each, in pieces as [`copy`].
 ///
 /// # Safety
-/// Each of the `count` addresses at `from` can be read, and `to` written; nobody else in this process uses `to`.
+/// Each of the `count` addresses at `from` is NULL or can be read, and `to` written; nobody else in this process uses `to`.
 #[inline(always)]
 pub unsafe fn gather(from: *const *const f64, count: usize, to: *mut f64) {
     // SAFETY: each place is below `count`, since the pieces add up to it.
@@ -155,7 +158,12 @@ pub unsafe fn gather(from: *const *const f64, count: usize, to: *mut f64) {
 unsafe fn gathered<const N: usize>(from: *const *const f64, to: *mut f64, at: &mut usize) {
     // SAFETY: the caller's promise.
     unsafe {
-        let values: [f64; N] = core::array::from_fn(|i| from.add(*at + i).read().read_volatile());
+        let values: [f64; N] = core::array::from_fn(|i| {
+            let place = from.add(*at + i).read();
+            // An address is chosen and read once: no branch a channel.
+            let place = if place.is_null() { &raw const NONE } else { place };
+            place.read_volatile()
+        });
         to.add(*at).cast::<[f64; N]>().write(values);
     }
     *at += N;

@@ -15,7 +15,8 @@ pub struct GibErrorDetail {
     pub field: *const c_char,
     /// The value found.
     pub value: f64,
-    /// Smallest value allowed. Where no range applies both bounds are 0.
+    /// Smallest value allowed. Where no range applies both bounds are 0: of a number that is odd, or a text of a fit length that is
+    /// spelled wrong, whose `value` is then the place of its first wrong character, from 1.
     pub low: f64,
     /// Largest value allowed.
     pub high: f64,

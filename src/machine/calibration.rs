@@ -82,8 +82,7 @@ pub fn save(table: &CalibrationTable, path: &Path) -> Result<(), Fault> {
 /// # Errors
 /// `GIB_ERR_IO`, and those of [`read`].
 pub fn load(path: &Path) -> Result<CalibrationTable, Fault> {
-    let text = std::fs::read_to_string(path).map_err(|_| Fault { code: GIB_ERR_IO, field: "path\0", ..Fault::NONE })?;
-    read(&text)
+    read(&super::whole::text(path)?)
 }
 
 #[cfg(test)]
@@ -116,6 +115,10 @@ mod tests {
         save(&table(), &path).unwrap();
         assert_eq!(load(&path), Ok(table()));
         assert_eq!(load(&folder.path().join("none")).unwrap_err().code, GIB_ERR_IO);
+        let foreign = folder.path().join("latin1.json");
+        std::fs::write(&foreign, b"{\n \"schema\": \"\xb5\" }").unwrap();
+        let refused = load(&foreign).unwrap_err();
+        assert_eq!((refused.code, refused.field, refused.value), (GIB_ERR_FORMAT, "json\0", 2.0));
         assert_eq!(save(&table(), &folder.path().join("no/such")).unwrap_err().code, GIB_ERR_IO);
     }
 

@@ -1,5 +1,6 @@
 //! Writes a file whole or not at all, so that what was there is not lost when the disk is full or the power fails.
 
+use crate::error::{Fault, GIB_ERR_FORMAT, GIB_ERR_IO};
 use std::fs::{self, File};
 use std::io::{Result, Write};
 use std::path::Path;
@@ -24,6 +25,19 @@ pub fn replace(file: &Path, text: &str) -> Result<()> {
         fs::rename(&beside, &file)
     };
     write().inspect_err(|_| _ = fs::remove_file(&beside))
+}
+
+/// The text of a JSON file.
+///
+/// # Errors
+/// `GIB_ERR_IO`; `GIB_ERR_FORMAT` with `json` and the line of what is not UTF-8.
+pub fn text(path: &Path) -> std::result::Result<String, Fault> {
+    let bytes = fs::read(path).map_err(|_| Fault { field: "path\0", ..Fault::of(GIB_ERR_IO) })?;
+    String::from_utf8(bytes).map_err(|wrong| {
+        let (well, _) = wrong.as_bytes().split_at(wrong.utf8_error().valid_up_to());
+        let line = well.iter().filter(|byte| **byte == b'\n').count() + 1;
+        Fault { field: "json\0", value: line as f64, ..Fault::of(GIB_ERR_FORMAT) }
+    })
 }
 
 #[cfg(test)]

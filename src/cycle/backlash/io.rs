@@ -1,5 +1,7 @@
 //! What crosses the boundary in every servo cycle. These structs are frozen for an ABI major.
 
+use crate::error::{Fault, GIB_ERR_CONFIG};
+
 /// The axis stands; gib asks for nothing.
 pub const GIB_BACKLASH_IDLE: i32 = 0;
 /// Waits until the compensation amount is 0 and reversal acceleration off.
@@ -34,6 +36,13 @@ pub const GIB_INPUT_FAULT: u32 = 1;
 /// Input flag: abort, as `gib_backlash_abort` does.
 pub const GIB_INPUT_ABORT: u32 = 2;
 
+/// The fault of flags that say neither: they mean something that this library does not know.
+#[must_use]
+pub fn unknown_flags(flags: u32) -> Fault {
+    let (value, high) = (f64::from(flags), f64::from(GIB_INPUT_FAULT | GIB_INPUT_ABORT));
+    Fault { code: GIB_ERR_CONFIG, field: "flags\0", value, low: 0.0, high }
+}
+
 /// What the kernel tells gib in a cycle.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -46,7 +55,7 @@ pub struct BacklashInput {
     pub compensation_um: f64,
     /// `request_id` of the last request that the kernel has carried out; 0 before the first.
     pub acknowledged_id: u32,
-    /// `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`; other bits must be 0.
+    /// `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`; other bits must be 0, else `GIB_ERR_CONFIG`.
     pub flags: u32,
 }
 

@@ -390,8 +390,11 @@ impl Backlash {
         if input.flags & GIB_INPUT_ABORT != 0 {
             return Some(Fault::of(GIB_ERR_ABORTED));
         }
-        if input.flags != 0 {
+        if input.flags & GIB_INPUT_FAULT != 0 {
             return Some(Fault::of(GIB_ERR_DRIVE_FAULT));
+        }
+        if input.flags != 0 {
+            return Some(unknown_flags(input.flags));
         }
         if !input.position_mm.is_finite() {
             return finite("position_mm\0", input.position_mm);

@@ -25,7 +25,7 @@ pub struct CalibrationConfig {
     pub torque_unit: i32,
     /// Zero.
     pub reserved: i32,
-    /// The frequencies, rising, 0.5 Hz to a tenth of the cycle frequency. Each is moved by less than half a percent, so
+    /// The frequencies, rising by 1 % at least, 0.5 Hz to a tenth of the cycle frequency. Each is moved by less than half a percent, so
     /// that whole periods take whole cycles. Required.
     pub frequency_hz: [f64; GIB_CALIBRATION_POINTS],
     /// Servo period, 0.00005 to 0.02 s. Required.
@@ -36,7 +36,7 @@ pub struct CalibrationConfig {
     pub speed_mm_s: f64,
     /// Largest acceleration, 1 to 1000000 mm/s² (default 5000).
     pub acceleration_mm_s2: f64,
-    /// Torque that must never be exceeded, N·m. Required.
+    /// Torque that must never be exceeded, 1e-6 to 1e6 N·m. Required.
     pub torque_bound_nm: f64,
     /// Part of it that the amplitude is chosen for, 0.05 to 0.9 (default 0.6).
     pub torque_share_ratio: f64,
@@ -47,14 +47,16 @@ pub struct CalibrationConfig {
     /// Full scale of the ball bar, 1 to 1000000 µm (default 1000).
     pub ball_bar_range_um: f64,
     /// What the accelerometers' makers promise of their gain, as a standard deviation, 0.001 to 1 (default 0.1). A gain that is off
-    /// by more than three of it is refused.
+    /// by more than three of it is refused. It is taken of the complex gain, along and across: where the experiments do not tell a
+    /// phase (see `condition_ratio`) it is believed to be 0 within 4 degrees for 0.1, one standard deviation. A sensor that may come
+    /// late by more needs more: a cycle is 18 degrees at a twentieth of the cycle frequency, which takes 0.3.
     pub tolerance_ratio: f64,
     /// Time of measuring at each frequency, 0.1 to 1000 s (default 4), rounded up to 32 periods at least.
     pub measure_s: f64,
     /// Time in which the amplitude goes up or down, 0.01 to 10 s (default 0.5), five periods at least; turned round on its way up, a
     /// quarter more.
     pub ramp_s: f64,
-    /// Largest |target - position|, up to 100 mm (default the stroke).
+    /// Largest |target - position|, 0.0001 to 100 mm (default the stroke).
     pub lag_limit_mm: f64,
 }
 

@@ -31,7 +31,7 @@ pub struct CalibrationInput {
     pub ball_bar_um: f64,
     /// Acceleration of seat and bearing, m/s².
     pub acceleration_m_s2: [f64; 2],
-    /// `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`; other bits must be 0.
+    /// `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`; other bits must be 0, else `GIB_ERR_CONFIG`.
     pub flags: u32,
     /// Zero.
     pub reserved: u32,
@@ -45,7 +45,7 @@ pub struct CalibrationOutput {
     pub target_position_mm: f64,
     /// Commanded speed, mm/s, signed.
     pub target_speed_mm_s: f64,
-    /// Present frequency, Hz.
+    /// Present frequency, Hz; after GIB_ERR_CALIBRATION_GAIN or _CONDITION the one whose gain was refused, and `point` its number.
     pub frequency_hz: f64,
     /// Present amplitude, mm.
     pub amplitude_mm: f64,

@@ -389,6 +389,8 @@ impl Calibration {
             if self.plan.published { published(&last) } else { least_squares(experiments, self.plan.tolerance) };
         if self.plan.published && found.condition > CONDITION_MAX {
             let (code, high) = (GIB_ERR_CALIBRATION_CONDITION, CONDITION_MAX);
+            // What is put out beside it says at which frequency.
+            self.point = i;
             return self.leave(Fault { code, field: "condition_ratio\0", value: found.condition, low: 1.0, high });
         }
         // A dead sensor leaves the whole ball bar to the other, whose gain then is none that its makers promised.
@@ -396,9 +398,12 @@ impl Calibration {
         let (low, high) = ((1.0 - most).max(0.1), (1.0 + most).min(10.0));
         let sound = |g: &Complex, spread: f64| g.0 > 0.0 && g.size() + spread > low && g.size() - spread < high;
         let spreads = found.variance.map(|v| 2.0 * (0.5 * v).sqrt());
-        if let Some((bad, _)) = found.gain.iter().zip(spreads).find(|(g, spread)| !sound(g, *spread)) {
-            let (code, value) = (GIB_ERR_CALIBRATION_GAIN, bad.size().copysign(bad.0));
-            return self.leave(Fault { code, field: "gain_ratio\0", value, low, high });
+        for ((bad, spread), field) in found.gain.iter().zip(spreads).zip(["gain_ratio[0]\0", "gain_ratio[1]\0"]) {
+            if !sound(bad, spread) {
+                self.point = i;
+                let (code, value) = (GIB_ERR_CALIBRATION_GAIN, bad.size().copysign(bad.0));
+                return self.leave(Fault { code, field, value, low, high });
+            }
         }
         let used = if self.plan.published { 1.0 } else { experiments.len() as f64 };
         self.table.point[i] = point(self.plan.tone(i).frequency, &found, last.amplitude, used);

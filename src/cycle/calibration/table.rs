@@ -20,7 +20,8 @@ pub struct CalibrationPoint {
     pub phase_deg: [f64; 2],
     /// Expanded uncertainty of the gain, k = 2.
     pub gain_uncertainty_ratio: [f64; 2],
-    /// Expanded uncertainty of the phase, k = 2, degrees.
+    /// Expanded uncertainty of the phase, k = 2, degrees. As far as it rests on `tolerance_ratio` it holds for a sensor that
+    /// comes no later than that allows.
     pub phase_uncertainty_deg: [f64; 2],
     /// How much an error of the measured displacements is magnified in the gains: 1 is best; beyond 100 the two cannot be
     /// told apart and only their difference is known.

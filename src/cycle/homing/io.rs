@@ -66,7 +66,7 @@ pub struct HomingInput {
     pub torque_limit: f64,
     /// `request_id` of the last request that the kernel has carried out; 0 before the first.
     pub acknowledged_id: u32,
-    /// `GIB_INPUT_FAULT` (also after a following-error trip), `GIB_INPUT_ABORT`; other bits must be 0.
+    /// `GIB_INPUT_FAULT` (also after a following-error trip), `GIB_INPUT_ABORT`; other bits must be 0, else `GIB_ERR_CONFIG`.
     pub flags: u32,
 }
 

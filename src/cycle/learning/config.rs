@@ -29,7 +29,7 @@ pub struct LearningConfig {
     pub settle_revolutions: i32,
     /// Updates at most, 1 to 10000 (default 100).
     pub updates: i32,
-    /// 1: begin from the correction that this instance holds, learnt before or loaded. 0 (default): from none.
+    /// 1: begin from the correction that this instance holds, learnt before or loaded, of as many points; refused without one. 0 (default): from none.
     pub resume: i32,
     /// Servo period, 0.00005 to 0.02 s. Required.
     pub cycle_s: f64,
@@ -51,7 +51,8 @@ pub struct LearningConfig {
     pub growth_ratio: f64,
     /// Slowest speed at which the spindle counts as turning, 1 to 10000 rpm (default 30).
     pub speed_min_rpm: f64,
-    /// Relative change of speed beyond which deviations are no longer compared, 0.001 to 0.5 (default 0.02).
+    /// Relative change of speed beyond which deviations are no longer compared, 0.001 to 0.5 (default 0.02); of a correction that is
+    /// kept it is told, by `GIB_LEARNING_SPEED_CHANGED`.
     pub speed_tolerance_ratio: f64,
     /// Time over which the correction comes and goes, 0.001 to 10 s (default 0.1).
     pub fade_s: f64,

@@ -26,7 +26,9 @@ pub const GIB_LEARNING_NO_ROTATION: u32 = 1;
 pub const GIB_LEARNING_BAD_ANGLE: u32 = 2;
 /// Reason: the detected position is no number.
 pub const GIB_LEARNING_NOT_DETECTED: u32 = 4;
-/// Reason: the speed changed by more than its tolerance; what was measured is not compared.
+/// Reason: the correction is kept, and the spindle turns at another speed than that at which it was learnt, by more than
+/// `speed_tolerance_ratio` over eight times `revolutions`: what is left is more than it was. By more than half of that speed, or
+/// the other way round, it would do harm, and is out until the speed is back.
 pub const GIB_LEARNING_SPEED_CHANGED: u32 = 8;
 /// Reason: the correction is at its bound.
 pub const GIB_LEARNING_LIMITED: u32 = 16;
@@ -41,7 +43,7 @@ pub struct LearningInput {
     pub detected_mm: f64,
     /// Spindle angle, degrees; wrapped anywhere or not at all.
     pub angle_deg: f64,
-    /// `GIB_INPUT_ABORT`, `GIB_INPUT_FAULT`; other bits must be 0. Both fade the correction out.
+    /// `GIB_INPUT_ABORT`, `GIB_INPUT_FAULT`; other bits must be 0, else `GIB_ERR_CONFIG`. All fade the correction out.
     pub flags: u32,
     /// Zero.
     pub reserved: u32,

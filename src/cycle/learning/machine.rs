@@ -12,18 +12,20 @@
 
 mod evaluate;
 mod held;
+mod out;
 mod quick;
+mod watch;
 
 use super::config::GIB_LEARNING_HARMONICS;
 use super::io::*;
 use super::lines::Line;
 use super::plan::Plan;
 use super::points::{Bin, Cell, ENTRIES, Place, Table, Weight};
-use crate::cycle::backlash::io::GIB_INPUT_ABORT;
 use crate::cycle::turns::{fold, folded};
 use crate::cycle::vibration::harmonic::Harmonics;
 use crate::error::*;
 use quick::Usual;
+use watch::{KEPT, Watch};
 
 /// Where the machine is. Each comment says what ends the state; those that wait have `wait_s` as their deadline.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,8 +96,9 @@ pub struct Learning {
     /// The last measurement cannot be compared with one before; it is the best so far.
     fresh: bool,
     better: bool,
-    /// Speed of the last measurement, turns per cycle.
+    /// Speed of the last measurement, turns per cycle; and how the present one differs from it.
     speed: f64,
+    watch: Watch,
     report: LearningReport,
     /// Sums of an analysis.
     turns: f64,
@@ -139,6 +142,7 @@ impl Default for Learning {
             fresh: true,
             better: false,
             speed: 0.0,
+            watch: Watch::NEAR,
             report: LearningReport::default(),
             turns: 0.0,
             squares: 0.0,
@@ -169,6 +173,9 @@ impl Learning {
         let plan = plan?;
         self.settle_usual();
         let held = f64::from(self.report.points);
+        if plan.resume && held == 0.0 {
+            return Err(Fault { field: "resume\0", value: 1.0, ..Fault::of(GIB_ERR_CONFIG) });
+        }
         if plan.resume && held != plan.scale {
             return Err(Fault { code: GIB_ERR_CONFIG, field: "points\0", value: plan.scale, low: held, high: held });
         }
@@ -276,7 +283,7 @@ impl Learning {
 
     fn any(&mut self, input: &LearningInput) {
         if !input.target_mm.is_finite() {
-            return self.blind();
+            return self.blind(input.target_mm);
         }
         if !self.busy() && !self.holds() {
             // What a load has left of a correction that was kept.
@@ -286,14 +293,15 @@ impl Learning {
             return;
         }
         if input.flags != 0 && self.phase != Phase::Stopping {
-            let aborted = input.flags & GIB_INPUT_ABORT != 0;
-            self.leave(Fault::of(if aborted { GIB_ERR_ABORTED } else { GIB_ERR_DRIVE_FAULT }));
+            self.leave(out::flagged(input.flags));
         }
         let turned = self.turn(input.angle_deg);
         let left = input.target_mm - input.detected_mm;
         self.judge(left);
         if self.busy() && self.phase != Phase::Stopping {
             self.wait_or_work(turned, left, input.target_mm);
+        } else if self.phase != Phase::Stopping {
+            self.watch(turned);
         }
         self.put_out(input.target_mm);
     }
@@ -404,7 +412,7 @@ impl Learning {
     /// Command of a cycle: the correction at this angle, as far as it is present, by a bounded step from the last.
     fn put_out(&mut self, target: f64) {
         let away = self.reasons & (GIB_LEARNING_NO_ROTATION | GIB_LEARNING_BAD_ANGLE) != 0;
-        let wanted = self.phase != Phase::Stopping && !away;
+        let wanted = self.phase != Phase::Stopping && !away && !self.watch.far;
         let presence = self.presence + if wanted { self.plan.fade } else { -self.plan.fade };
         self.presence = presence.clamp(0.0, 1.0);
         let place = Place::of(self.angle, self.plan.scale);
@@ -419,31 +427,6 @@ impl Learning {
         self.end_of_stopping();
     }
 
-    /// A cycle of fading out without a target to put it on.
-    fn fade_out(&mut self) {
-        self.presence = (self.presence - self.plan.fade).max(0.0);
-        self.correction -= self.correction.max(-self.plan.slope).min(self.plan.slope);
-        self.end_of_stopping();
-    }
-
-    fn end_of_stopping(&mut self) {
-        if self.phase == Phase::Stopping && self.presence == 0.0 && self.correction == 0.0 {
-            self.enter(Phase::Failed);
-        }
-    }
-
-    /// The target itself is no number: the last command, and an error that is kept.
-    #[cold]
-    fn blind(&mut self) {
-        if !self.busy() && !self.holds() {
-            return;
-        }
-        if self.phase != Phase::Stopping {
-            self.leave(Fault { code: GIB_ERR_NON_FINITE, field: "target_mm\0", ..Fault::NONE });
-        }
-        self.fade_out();
-    }
-
     /// The one door out.
     fn leave(&mut self, fault: Fault) {
         self.fault = fault;
@@ -454,6 +437,7 @@ impl Learning {
         self.settle_usual();
         self.phase = phase;
         (self.progress, self.cycles, self.at) = (0.0, 0, 0);
+        self.watch = Watch::NEAR;
     }
 
     fn status(&self) -> i32 {

@@ -99,8 +99,8 @@ impl Plan {
         let fewest = if published { 16.0 } else { f64::max(16.0, 4.0 * harmonics) };
         let points = whole("points\0", c.points, 256.0, fewest, GIB_LEARNING_POINTS as f64)?;
         if points as u32 & 1 != 0 {
-            let high = GIB_LEARNING_POINTS as f64;
-            return Err(Fault { code: GIB_ERR_CONFIG, field: "points\0", value: points, low: fewest, high });
+            // Odd, within the range: bounds of 0 say that no range is what it misses.
+            return Err(Fault { field: "points\0", value: points, ..Fault::of(GIB_ERR_CONFIG) });
         }
         let most = in_range("correction_max_um\0", c.correction_max_um, 0.1, 1e5)?;
         let speed = in_range("correction_speed_mm_s\0", or(c.correction_speed_mm_s, 100.0), 1e-3, 1e4)?;

@@ -69,15 +69,27 @@ fn check(wanted: &Wanted) -> Result<(), Fault> {
         low: 1.0,
         high: high as f64,
     };
+    // Of a text or number within its range the place of what is wrong, or the number itself, and no range.
+    let spelled = |field, value: usize| Fault { field, value: value as f64, ..Fault::of(GIB_ERR_CONFIG) };
+    let named = |field, name: &str, dots: &str| {
+        let fit =
+            |(at, c): (usize, char)| c.is_ascii_alphanumeric() || "-_".contains(c) || (at > 0 && dots.contains(c));
+        match name.char_indices().find(|at| !fit(*at)) {
+            Some((at, _)) if name.len() <= ring::NAME_MOST => spelled(field, at + 1),
+            _ => config(field, name.len(), ring::NAME_MOST),
+        }
+    };
     if !ring::is_name(wanted.name) {
-        return Err(config("name\0", wanted.name.len(), ring::NAME_MOST));
+        return Err(named("name\0", wanted.name, "."));
     }
     let machine = wanted.machine;
     if !(ring::is_name(machine) && machine.len() < MACHINE_BYTES && !machine.contains('.')) {
-        return Err(config("machine\0", machine.len(), ring::NAME_MOST));
+        return Err(named("machine\0", machine, ""));
     }
     if wanted.mode & !0o666 != 0 || wanted.mode & 0o600 != 0o600 {
-        return Err(Fault { low: f64::from(0o600), ..config("mode\0", wanted.mode as usize, 0o666) });
+        let within = (0o600..=0o666).contains(&wanted.mode);
+        let (value, low) = (wanted.mode as usize, f64::from(0o600));
+        return Err(if within { spelled("mode\0", value) } else { Fault { low, ..config("mode\0", value, 0o666) } });
     }
     if wanted.columns.len() >= COLUMNS_BYTES {
         return Err(config("columns\0", wanted.columns.len(), COLUMNS_BYTES - 1));

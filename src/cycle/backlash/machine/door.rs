@@ -54,6 +54,36 @@ impl Backlash {
         }
     }
 
+    /// A cycle without an input: it cannot be told any more whether the axis follows. What is under way brakes from this cycle on; a
+    /// way out goes on without what an input confirms.
+    #[cold]
+    pub fn miss(&mut self) {
+        const NOTHING: BacklashInput = BacklashInput {
+            position_mm: f64::NAN,
+            torque: f64::NAN,
+            compensation_um: f64::NAN,
+            acknowledged_id: 0,
+            flags: 0,
+        };
+        if !self.busy() {
+            return;
+        }
+        let begins = self.phase == Phase::Begin;
+        if !self.regardless() {
+            self.leave(Fault { field: "input\0", ..Fault::of(GIB_ERR_NULL) });
+            self.set_off();
+        } else if self.left == 0 {
+            self.overdue(&NOTHING);
+        } else {
+            self.left -= 1;
+            self.advance(&NOTHING);
+        }
+        // Before the first input it is not known where the axis stands.
+        if !begins {
+            self.put_out();
+        }
+    }
+
     /// One cycle of braking.
     pub(super) fn brake(&mut self) {
         if self.profile.step() {

@@ -1,7 +1,7 @@
 //! What in a cycle's input must end a calibration, and what leaves the axis beyond command.
 
 use super::{Calibration, Phase};
-use crate::cycle::backlash::io::GIB_INPUT_ABORT;
+use crate::cycle::backlash::io::{GIB_INPUT_ABORT, GIB_INPUT_FAULT, unknown_flags};
 use crate::cycle::calibration::io::CalibrationInput;
 use crate::error::*;
 
@@ -9,6 +9,19 @@ use crate::error::*;
 const POSITION: &str = "position_mm\0";
 
 impl Calibration {
+    /// A cycle without an input: it cannot be told any more whether the axis follows, so the amplitude falls, from this cycle on.
+    #[cold]
+    pub fn miss(&mut self) {
+        if !self.busy() {
+            return;
+        }
+        self.leave(Fault { field: "input\0", ..Fault::of(GIB_ERR_NULL) });
+        if self.busy() {
+            self.swing();
+            self.command();
+        }
+    }
+
     /// Anything in this cycle's input that must end the calibration. On the way out only what stops the drive does.
     #[inline(always)]
     pub(super) fn danger(&self, input: &CalibrationInput) -> Option<Fault> {
@@ -31,8 +44,11 @@ impl Calibration {
         if input.flags & GIB_INPUT_ABORT != 0 {
             return Some(Fault::of(GIB_ERR_ABORTED));
         }
-        if input.flags != 0 {
+        if input.flags & GIB_INPUT_FAULT != 0 {
             return Some(Fault::of(GIB_ERR_DRIVE_FAULT));
+        }
+        if input.flags != 0 {
+            return Some(unknown_flags(input.flags));
         }
         let [a1, a2] = input.acceleration_m_s2;
         let off = input.position_mm - self.start;

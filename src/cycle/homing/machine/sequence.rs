@@ -334,7 +334,9 @@ impl Homing {
     /// it was told to is not to brake on what it presses on.
     #[cold]
     pub(super) fn leave(&mut self, fault: Fault) {
-        let blind = [GIB_ERR_HOMING_ENCODER, GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE, GIB_ERR_TORQUE_BOUND];
+        // Flags that are not known (GIB_ERR_CONFIG) may say that the drive does not obey.
+        let blind =
+            [GIB_ERR_HOMING_ENCODER, GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE, GIB_ERR_TORQUE_BOUND, GIB_ERR_CONFIG];
         self.leave_by(fault, blind.contains(&fault.code));
     }
 

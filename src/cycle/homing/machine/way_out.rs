@@ -47,6 +47,38 @@ impl Homing {
         self.command();
     }
 
+    /// A cycle without an input: it cannot be told any more whether the axis follows. What is under way brakes from this cycle on; on the
+    /// way out a move goes on to its end, and what needs a reading waits for one, until its deadline.
+    #[cold]
+    pub fn miss(&mut self) {
+        if !self.busy() {
+            return;
+        }
+        self.end_usual();
+        self.now += 1;
+        let begins = self.phase == Phase::Begin;
+        match self.phase {
+            Phase::Stopping | Phase::Unload | Phase::Relieve | Phase::Restore if self.now >= self.deadline => {
+                self.overdue_exit();
+            }
+            Phase::Stopping if !self.stopped => self.stopped = self.arrived(),
+            Phase::Unload => {
+                self.arrived();
+            }
+            Phase::Stopping | Phase::Relieve | Phase::Restore => {}
+            _ => {
+                self.leave(Fault { field: "input\0", ..Fault::of(GIB_ERR_NULL) });
+                if self.phase == Phase::Stopping {
+                    self.set_off();
+                }
+            }
+        }
+        // Before the first input it is not known where the axis stands.
+        if !begins {
+            self.command();
+        }
+    }
+
     #[cold]
     fn overdue_exit(&mut self) {
         match self.phase {

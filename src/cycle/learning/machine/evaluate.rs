@@ -141,8 +141,9 @@ impl Learning {
         let most = self.plan.most as f32;
         let next = if self.last_update { *best } else { now + self.plan.gain as f32 * seen };
         let next = next.max(-most).min(most);
-        self.report.correction_um = self.report.correction_um.max(next.abs().into());
-        self.coming[i & (ENTRIES - 1)].value = clean(next);
+        let next = bounded(next, self.plan.most);
+        self.report.correction_um = self.report.correction_um.max(next.abs());
+        self.coming[i & (ENTRIES - 1)].value = next;
     }
 
     /// By harmonics: see [`crate::cycle::learning`].
@@ -184,8 +185,9 @@ impl Learning {
         let pairs = self.plan.pairs;
         let wheel = Wheel::at(angle(i, self.plan.points), pairs);
         let (value, slope) = (self.spectrum.value(&wheel, pairs), self.steep.value(&wheel, pairs));
-        self.report.correction_um = self.report.correction_um.max(value.abs().into());
-        self.coming[i & (ENTRIES - 1)] = Cell { value: clean(value), slope: clean(slope) };
+        let value = bounded(value, self.plan.most);
+        self.report.correction_um = self.report.correction_um.max(value.abs());
+        self.coming[i & (ENTRIES - 1)] = Cell { value, slope: clean(slope) };
     }
 
     /// Slope of a correction that is only known at its points.
@@ -203,4 +205,9 @@ impl Learning {
 /// Without digits that could become subnormal.
 fn clean(value: f32) -> f64 {
     f64::from((value + 1e-10) - 1e-10)
+}
+
+/// The same within the largest correction, which sums in single precision may miss by their rounding.
+fn bounded(value: f32, most: f64) -> f64 {
+    clean(value).max(-most).min(most)
 }

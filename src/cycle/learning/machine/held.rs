@@ -69,6 +69,8 @@ impl Learning {
     /// The harmonics of the correction in force, from which the next trials start.
     pub(super) fn take_up(&mut self) {
         let points = self.plan.points;
+        // An evaluation that an abort cut short has left this unfinished, and what it says is how far usual cycles may trust the table.
+        self.report.correction_um = self.force.iter().take(points).fold(0.0, |most, cell| cell.value.abs().max(most));
         let mut sums = Harmonics::default();
         for (i, cell) in self.force.iter().enumerate().take(points) {
             sums.gather(&Wheel::at(angle(i, points), PAIRS), PAIRS, cell.value as f32);

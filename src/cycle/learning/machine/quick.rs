@@ -80,7 +80,7 @@ impl Learning {
         let cycles = match self.phase {
             Phase::Settle if self.at > self.plan.points => (self.plan.settle - self.progress) / rate - 1.0,
             Phase::Measure => (self.plan.measure - self.progress) / rate - 1.0,
-            Phase::Done => MOST,
+            Phase::Done => (KEPT * self.plan.measure - self.progress) / rate - 1.0,
             _ => 0.0,
         };
         let at = (self.angle + 0.5) * self.plan.scale;
