@@ -87,8 +87,9 @@ pub struct Trackers {
     pub shares: [[Lanes; PAIRS]; 2],
     /// What stays when they are gone; drifts are followed.
     pub offset: [f64; 2],
-    /// Mean of the first revolution so far, above the offset.
+    /// Mean of the first revolution so far, above the offset, and of its square.
     mean: [f64; 2],
+    square: [f64; 2],
     /// Squares of the largest deviations that are believed in full; then of two values that are bounded beside them.
     pub bounds: Lanes,
     /// Turns for which a signal was not what the harmonics said, less those for which it was.
@@ -113,19 +114,24 @@ impl Trackers {
     /// A reading of the first revolution, of which it takes up `part`: Fourier's integrals, term by term.
     pub fn first(&mut self, wheel: &Wheel, pairs: usize, readings: [f64; 2], part: f64) {
         for (n, reading) in readings.into_iter().enumerate() {
-            let left = part * (reading - self.offset[n]);
+            let above = reading - self.offset[n];
+            let left = part * above;
             self.mean[n] += left;
+            self.square[n] += left * above;
             let asked = 2.0 * left as f32;
             self.harmonics[n].learn(wheel, pairs, asked, &self.shares[n]);
         }
     }
 
-    /// The first revolution is whole.
+    /// The first revolution is whole. Of what it leaves nothing is known yet: no more than all of it may be noise.
     pub fn known(&mut self) {
+        let variance = core::array::from_fn(|n| (self.square[n] - self.mean[n] * self.mean[n]) as f32);
+        self.set_variance(variance);
         for n in 0..2 {
             self.offset[n] += self.mean[n];
-            self.mean[n] = 0.0;
+            (self.mean[n], self.square[n]) = (0.0, 0.0);
         }
+        self.keep_floor();
     }
 
     /// Variance of what is left of each signal.
@@ -155,15 +161,17 @@ impl Trackers {
         Lanes::new([first as f32, second as f32, 0.0, 0.0]) - known * Lanes::new([square, square, growth, growth])
     }
 
-    /// Deviations with those beyond belief cut down, after `turned` turns.
-    pub fn believed(&mut self, left: Lanes, turned: f32) -> Lanes {
+    /// Deviations with those beyond belief cut down, after `turned` turns; `hurry`: how many times as fast the variance learns as it does
+    /// in the long run. What is beyond belief makes it grow no faster for that.
+    pub fn believed(&mut self, left: Lanes, turned: f32, hurry: f32) -> Lanes {
+        let counts = (1.0 + (CLIP * CLIP - 1.0) / hurry) / (CLIP * CLIP);
         let (mut believed, most) = (left.to_array(), self.bounds.to_array());
         for n in 0..2 {
             let calmer = self.surprise[n] - turned;
             self.surprise[n] = if calmer > 0.0 { calmer } else { 0.0 };
             let square = believed[n] * believed[n];
             if square > most[n] {
-                believed[n] *= (most[n] / square).sqrt();
+                believed[n] *= (counts * most[n] / square).sqrt();
                 self.surprise[n] += 2.0 * turned;
             }
         }

@@ -9,6 +9,8 @@
 //! correction has faded out. In every other state, and whatever happens, the position is the plain scale.
 
 mod follow;
+#[cfg(test)]
+mod offset_tests;
 mod out;
 mod quick;
 mod renew;
@@ -85,6 +87,8 @@ pub struct Vibration {
     /// Displacement of seat and bearing, µm, for the speed for which the harmonics stand.
     displacement: [Harmonics; 2],
     integrators: [Integrator; 2],
+    /// Sum of the second slide's positions in the revolution that is integrated, µm, and of how many cycles.
+    slid: [f64; 2],
     /// Last good displacement by integration, µm: what fades out.
     held: [f64; 2],
 }
@@ -116,6 +120,7 @@ impl Default for Vibration {
             known: [[Known::default(); PAIRS]; 2],
             displacement: [Harmonics::default(); 2],
             integrators: [Integrator::default(); 2],
+            slid: [0.0; 2],
             held: [0.0; 2],
         }
     }
@@ -312,13 +317,10 @@ impl Vibration {
         self.follow();
         let turning = self.turning(self.spindle.turned);
         let shares = [turning * self.part, turning];
-        let (displacement, progress, mut growth) = (self.displacement, self.progress, self.growth);
+        let (displacement, hurry, mut growth) = (self.displacement, self.part / self.plan.share_min, self.growth);
         for (trackers, readings) in self.signals(input) {
-            let mut left = trackers.left(wheel, N, readings, &displacement, growth);
-            // Until then the variance is not known.
-            if progress > 3.0 {
-                left = trackers.believed(left, turning);
-            }
+            let left = trackers.left(wheel, N, readings, &displacement, growth);
+            let left = trackers.believed(left, turning, hurry);
             trackers.learn(wheel, N, left, shares, growth);
             // The second slide moves by command, however fast the spindle turns.
             growth = 1.0;
@@ -337,14 +339,18 @@ impl Vibration {
         // Also while what was known goes.
         if reasons & !GIB_VIBRATION_NO_REVOLUTION != 0 || self.progress == 0.0 {
             self.integrators.iter_mut().for_each(Integrator::restart);
+            self.slid = [0.0; 2];
             return self.held;
         }
         if self.progress >= self.revolution {
             let late = self.plan.cycle * (self.progress - self.revolution) / self.spindle.turned.abs();
             self.revolution += 1.0;
             self.integrators.iter_mut().for_each(|integrator| integrator.close(late));
-            self.slide.offset[0] = 1e3 * input.second_slide_mm;
+            // What is integrated has no mean either.
+            let [sum, cycles] = self.slid;
+            (self.slide.offset[0], self.slid) = (if cycles > 0.0 { sum / cycles } else { sum }, [0.0; 2]);
         }
+        self.slid = [self.slid[0] + 1e3 * input.second_slide_mm, self.slid[1] + 1.0];
         let rate = self.plan.main * self.spindle.rate;
         let gain = self.plan.gain(rate.abs()).to_array().map(f64::from);
         // j·x of a sinusoid is its velocity over ω.

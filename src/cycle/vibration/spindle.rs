@@ -63,7 +63,7 @@ impl Spindle {
         let angle = fold(angle_deg * (1.0 / 360.0));
         // 0 in the first cycle, and no number where the angle is none.
         let turned = if self.known > 0 { fold(angle - self.angle) } else { 0.0 * angle };
-        let good = turned.abs() <= plan.turn_max;
+        let good = turned.abs() <= plan.turn_max && !self.turns_back(plan, turned);
         if good {
             self.angle = angle;
             self.turned = turned;
@@ -79,6 +79,15 @@ impl Spindle {
         self.see_leap(plan, rate);
         self.rate = rate;
         good
+    }
+
+    /// Whether this turn alone would take more than half off the rate of a spindle that turns: none does. It is what is left of whole turns
+    /// where cycles are missing.
+    #[inline(always)]
+    fn turns_back(&self, plan: &Plan, turned: f64) -> bool {
+        let rate = self.rate.abs();
+        let slower = (self.rate - turned) * if self.rate < 0.0 { -plan.speed_share } else { plan.speed_share };
+        rate >= plan.rate_min && slower > 0.5 * rate && slower > plan.speed_share * 2.0 * rate
     }
 
     /// A rate that comes: what leapt is no speed, and is forgotten as the filter does. No more than half of the rate, so that there is

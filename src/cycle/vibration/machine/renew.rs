@@ -74,18 +74,30 @@ impl Renewal {
 }
 
 impl Vibration {
-    /// A whole pair.
+    /// A whole pair. What is put out of it changes no faster than the largest correction fades.
     pub(super) fn renew_pair(&mut self) {
         self.renewal.count = self.renewal.count.wrapping_add(1);
         let pair = self.renewal.count as usize & (self.plan.pairs.wrapping_sub(1) & (PAIRS - 1));
         if self.stale(pair) {
             self.find_factors(pair);
         }
+        let before = self.displacement.map(|harmonics| harmonics.0[pair]);
         self.look_at(GIB_VIBRATION_SEAT, pair);
         self.believe(GIB_VIBRATION_SEAT, pair);
         self.look_at(GIB_VIBRATION_BEARING, pair);
         self.believe(GIB_VIBRATION_BEARING, pair);
         self.keep_average();
+        // While little of it is put out it may come at once.
+        let most = 2.0 * self.plan.displacement_max * self.plan.fade;
+        let most = most as f32 / (self.blend as f32).max(self.plan.fade as f32);
+        for (harmonics, before) in self.displacement.iter_mut().zip(before) {
+            let change = harmonics.0[pair] - before;
+            let [a, b, c, d] = (change * change).to_array();
+            let size = ((a + b) + (c + d)).sqrt();
+            if size > most {
+                harmonics.0[pair] = before + change * Lanes::splat(most / size);
+            }
+        }
     }
 
     /// One cycle of some looks whether the sensors live, and renews a slice of a pair.
