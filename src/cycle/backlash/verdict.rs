@@ -59,7 +59,7 @@ pub struct BacklashEstimate {
 pub struct BacklashReport {
     /// After motion in the first direction, then in the other; all zero where not measured.
     pub each: [BacklashEstimate; 2],
-    /// Mean of both, or the first alone with `one_direction`.
+    /// Mean of both; the first alone with `one_direction`, and for as long as the other was not measured.
     pub mean: BacklashEstimate,
     /// Amount in force when the measurement began, µm.
     pub old_value_um: f64,
@@ -233,7 +233,7 @@ impl Sense {
 pub struct Estimates {
     /// A sense that was not measured is all zero.
     pub each: [BacklashEstimate; 2],
-    /// Mean of both, or the one.
+    /// Mean of both, or the one that was measured.
     pub mean: BacklashEstimate,
     /// The table's presliding that was taken off, in ‰ of the mean's lost motion; 0 where none shows.
     pub presliding_permille: i32,
@@ -255,7 +255,7 @@ pub fn estimates(plan: &Plan, encoder: f64, senses: &[Sense; 2]) -> Estimates {
         if told { (1e3 * give.mean() / (straight - give.mean()).max(f64::MIN_POSITIVE)).min(1e6) } else { 0.0 };
     let presliding_permille = (permille + 0.5) as i32;
     let first = senses[0].estimate(plan, told, common, &senses[1]);
-    if plan.senses == 1 {
+    if senses[1].reversals == 0.0 {
         return Estimates { each: [first, BacklashEstimate::default()], mean: first, presliding_permille };
     }
     let second = senses[1].estimate(plan, told, common, &senses[0]);
@@ -400,6 +400,20 @@ pub fn check_result(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_sense_that_was_not_measured_yet_halves_nothing() {
+        let fit = Fitted { lost_motion: 0.04, variance: 1e-8, clearance: 0.03, stiffness: 700.0, ..Fitted::default() };
+        let levels = Levels { before: -4.0, after: 4.0, motor: 0.0, variance: 1e-6 };
+        let mut senses = [Sense::default(); 2];
+        senses[0].add(&fit, &levels, None, 10.0);
+        let both = Plan { senses: 2, ..Plan::REST };
+        let Estimates { each, mean, .. } = estimates(&both, 0.0, &senses);
+        assert_eq!((each[1], mean), (BacklashEstimate::default(), each[0]));
+        assert!((mean.lost_motion_um - 40.0).abs() < 1e-9, "{} µm", mean.lost_motion_um);
+        senses[1].add(&Fitted { lost_motion: 0.06, ..fit }, &levels, None, 10.0);
+        assert!((estimates(&both, 0.0, &senses).mean.lost_motion_um - 50.0).abs() < 1e-9);
+    }
 
     #[test]
     fn the_probe_is_held_against_a_short_clearance_that_shows() {
