@@ -63,7 +63,8 @@ pub const GIB_ERR_BACKLASH_NOISE: i32 = -102;
 pub const GIB_ERR_BACKLASH_DIRECTIONS: i32 = -103;
 /// The lost motion is smaller than the encoder or the noise can resolve.
 pub const GIB_ERR_BACKLASH_RESOLUTION: i32 = -104;
-/// The torque curve has not the shape of a release, a clearance and a wind-up.
+/// The torque curve has not the shape of a release, a clearance and a wind-up; also where the table has slipped, so that the release
+/// is not on it.
 pub const GIB_ERR_BACKLASH_SHAPE: i32 = -105;
 /// The share of friction on the motor side could not be told from the wind-up.
 pub const GIB_ERR_BACKLASH_MOTOR_FRICTION: i32 = -106;

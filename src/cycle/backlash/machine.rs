@@ -25,6 +25,8 @@ mod door;
 mod measure;
 mod quick;
 mod readings;
+#[cfg(test)]
+mod tests;
 
 use readings::{Probe, Watch};
 
@@ -116,6 +118,8 @@ pub struct Backlash {
     turn_command: f64,
     /// Furthest that the motor came before the scan, in the sense of the scan: the lowest.
     furthest: f64,
+    /// The table broke away in the old sense during the scan, and the curve was begun anew where the motor turned.
+    slipped: bool,
     profile: Profile,
     last_position: f64,
     smallest_change: f64,
@@ -158,6 +162,7 @@ impl Default for Backlash {
             turn: 0.0,
             turn_command: 0.0,
             furthest: f64::INFINITY,
+            slipped: false,
             profile: Profile::default(),
             last_position: 0.0,
             smallest_change: f64::INFINITY,

@@ -202,6 +202,13 @@ impl Plan {
         CREEP + self.slide + self.limit + self.lag_limit + 2.0 * self.slide_speed * self.slide_speed / self.acceleration
     }
 
+    /// How far a motor that stands may be off the place where it was read, mm: no more than the curve leaves out at its begin.
+    #[inline(always)]
+    #[must_use]
+    pub fn stands(&self) -> f64 {
+        2.0 * self.bin
+    }
+
     /// Furthest that a command goes from the reversal during scan and probe.
     #[must_use]
     pub fn reach(&self) -> f64 {

@@ -315,6 +315,28 @@ pub fn check_reversal(fit: Option<&Fitted>, torque_nm: f64) -> Result<Fitted, Fa
     Ok(*fit)
 }
 
+/// Says whether the curve begins with the release. A table that has slipped before the turn leaves the drive slack, and what the motor
+/// crossed of the clearance is on no curve. `returned` (mm): the motor's way back before the curve; `bin` (mm): of the curve.
+///
+/// # Errors
+/// `GIB_ERR_BACKLASH_SHAPE` with the release that the curve shows, `_NOISE` where noise may hide it.
+pub fn check_release(fit: &Fitted, levels: &Levels, returned: f64, slipped: bool, bin: f64) -> Result<(), Fault> {
+    /// Bins of release without which the first kink may be anywhere before them, and share of what was wound that is one.
+    const SHORT: f64 = 8.0;
+    const SHARE: f64 = 0.5;
+    // Where the release is known to lie before the curve, the way was counted from the turn.
+    let counted = fit.turn_error > 0.0;
+    let Some(wound) = fit.wound(levels, bin).filter(|_| !counted) else { return Ok(()) };
+    let share = if slipped { f64::INFINITY } else { SHARE * (wound - returned) };
+    let least = share.min(SHORT * bin);
+    if fit.held < least {
+        let hidden = fit.variance.sqrt() > fit.held;
+        let (code, field) = (if hidden { GIB_ERR_BACKLASH_NOISE } else { GIB_ERR_BACKLASH_SHAPE }, "release_um\0");
+        return Err(Fault { code, field, value: 1e3 * fit.held, low: 1e3 * least, high: f64::MAX });
+    }
+    Ok(())
+}
+
 /// Says whether curve and probe found the same friction on the motor's side: across a clearance the motor has nothing else to
 /// overcome, but for the zero of the torque reading, which the middle of the sliding levels bounds. `torque_nm` is N·m in the
 /// unit of their torque.
