@@ -63,9 +63,10 @@ pub struct BacklashReport {
     pub mean: BacklashEstimate,
     /// Amount in force when the measurement began, µm.
     pub old_value_um: f64,
-    /// Amount that gib asked the kernel to put in force, µm; 0 when none was written.
+    /// Amount that gib asked the kernel to put in force, µm, not rounded to `compensation_resolution_um`; 0 when none was written.
     pub value_written_um: f64,
-    /// Amount that the kernel reported in force at the last confirmed request, µm.
+    /// Amount that the kernel reported in force at the last confirmed request, µm: within half a `compensation_resolution_um` of what was
+    /// asked for.
     pub value_active_um: f64,
     /// `GIB_DONE`, `GIB_BUSY`, `GIB_OK` before a start, or the first error, also once an operator's wish was carried out since.
     pub status: i32,

@@ -30,9 +30,8 @@ impl Axis {
     }
 }
 
-/// Runs a measurement; `happens` may move motor and table in every cycle. Also returns the lost motion that is true, µm.
-fn measured(happens: impl Fn(&mut Axis, f64)) -> (Backlash, f64) {
-    let config = BacklashConfig {
+fn config() -> BacklashConfig {
+    BacklashConfig {
         struct_size: size_of::<BacklashConfig>() as u32,
         cycle_s: 0.001,
         travel_min_mm: -20.0,
@@ -40,9 +39,13 @@ fn measured(happens: impl Fn(&mut Axis, f64)) -> (Backlash, f64) {
         torque_bound_nm: 10.0,
         encoder_um: 0.01,
         ..BacklashConfig::default()
-    };
+    }
+}
+
+/// Runs a measurement; `happens` may move motor and table in every cycle. Also returns the lost motion that is true, µm.
+fn measured(happens: impl Fn(&mut Axis, f64)) -> (Backlash, f64) {
     let mut gib = Box::<Backlash>::default();
-    gib.start(Plan::new(&config)).expect("a good configuration");
+    gib.start(Plan::new(&config())).expect("a good configuration");
     let mut axis = Axis { ahead: 0.0, motor: 0.0, table: 0.0, since: 0, phase: 0, random: 1 };
     let mut out = *gib.output();
     for _ in 0..200_000 {
@@ -128,4 +131,27 @@ fn a_table_that_leaves_the_drive_slack_before_the_turn_is_refused() {
     });
     let fault = gib.fault();
     assert_eq!((fault.code, fault.field), (GIB_ERR_BACKLASH_SHAPE, "release_um\0"));
+}
+
+#[test]
+fn a_kernel_that_answers_and_leaves_another_amount_in_force_owes_the_restore() {
+    let mut gib = Box::<Backlash>::default();
+    gib.start(Plan::new(&config())).expect("a good configuration");
+    let old = BacklashInput { compensation_um: 1.0, ..BacklashInput::default() };
+    let answered = |gib: &Backlash, compensation_um: f64| BacklashInput {
+        compensation_um,
+        acknowledged_id: gib.output().request_id,
+        ..BacklashInput::default()
+    };
+    gib.step(&old);
+    gib.step(&answered(&gib, 0.0));
+    gib.abort();
+    // The old amount is one resolution; what is in force is none.
+    while gib.busy() {
+        gib.step(&answered(&gib, 0.0));
+    }
+    assert_eq!((gib.output().message, gib.report().restore_owed), (GIB_ERR_RESTORE_UNCONFIRMED, 1));
+    // Rounding is no fault.
+    gib.step(&answered(&gib, 0.5));
+    assert_eq!(gib.report().restore_owed, 0);
 }
