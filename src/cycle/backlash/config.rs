@@ -65,7 +65,8 @@ pub struct BacklashConfig {
     /// Travel over which the sliding torque is read, 0.1 to 100 mm and no less than 48 cycles at `slide_speed_mm_s` take (default 1, or
     /// that).
     pub slide_mm: f64,
-    /// Largest commanded acceleration, 0.1 to 10000 mm/s² (default 50).
+    /// Largest commanded acceleration, 0.1 to 10000 mm/s² (default 50). In the cycle in which a move ends it may be one and a half times
+    /// that; GIB_INPUT_FAULT stops the command at once, and the steps of `GIB_BACKLASH_STEP` are jumps of the position.
     pub acceleration_mm_s2: f64,
     /// Lowest motor position allowed, mm, from -1e6. Required, with `travel_max_mm`.
     pub travel_min_mm: f64,

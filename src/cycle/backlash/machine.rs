@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Idle → Begin → Clear → for each reversal (Approach → SlideBack → SlideIn → CreepIn → Settle → Scan → Unwind → ProbeBack → Unwind →
-//!                                   ProbeForth → Evaluate) → Write → Done
+//!                                   ProbeForth → Rest → Evaluate) → Write → Done
 //!          any state ──fault, abort, deadline, refusal──▶ leave: Stopping → Restore → Failed
 //! ```
 //!
@@ -57,6 +57,8 @@ enum Phase {
     ProbeBack,
     /// Ends when the motor has come forth again.
     ProbeForth,
+    /// Ends when the command stands.
+    Rest,
     /// Ends when the peak rule has seen bin `bin` and all after it.
     EvaluatePeak { bin: usize },
     /// Ends when the fit stands.
@@ -448,7 +450,7 @@ impl Backlash {
             Phase::SlideIn | Phase::CreepIn => GIB_BACKLASH_SLIDE_IN,
             Phase::Settle => GIB_BACKLASH_SETTLE,
             Phase::Scan => GIB_BACKLASH_SCAN,
-            Phase::Unwind { .. } | Phase::ProbeBack | Phase::ProbeForth => GIB_BACKLASH_PROBE,
+            Phase::Unwind { .. } | Phase::ProbeBack | Phase::ProbeForth | Phase::Rest => GIB_BACKLASH_PROBE,
             Phase::EvaluatePeak { .. } | Phase::EvaluateFit | Phase::Conclude => GIB_BACKLASH_EVALUATE,
             Phase::Write { .. } => GIB_BACKLASH_WRITE,
             Phase::Stopping => GIB_BACKLASH_STOPPING,

@@ -25,6 +25,11 @@ impl Backlash {
                 }
             }
             Phase::CreepIn => self.creep(input),
+            Phase::Rest => {
+                if self.profile.step() {
+                    self.probed();
+                }
+            }
             Phase::Settle => self.settle(input),
             Phase::EvaluatePeak { bin } => self.evaluate_peak(bin),
             Phase::EvaluateFit => {
@@ -338,14 +343,15 @@ impl Backlash {
         } else if self.phase == Phase::ProbeBack {
             self.unwind(input, true);
         } else {
-            self.probed();
+            self.profile.stop();
+            let bound = self.profile.cycles_bound();
+            self.enter(Phase::Rest, bound);
         }
     }
 
     /// All of one reversal is recorded.
     #[cold]
     fn probed(&mut self) {
-        self.profile.halt();
         let (twice, twice_variance) = self.probe.difference();
         let motor = (0.5 * twice).max(0.0);
         if let Err(fault) = self.probe.check(twice, twice_variance, [self.before.mean(), self.after.mean()]) {

@@ -42,10 +42,15 @@ fn config() -> BacklashConfig {
     }
 }
 
-/// Runs a measurement; `happens` may move motor and table in every cycle. Also returns the lost motion that is true, µm.
+/// Runs a measurement, see `measured_as`.
 fn measured(happens: impl Fn(&mut Axis, f64)) -> (Backlash, f64) {
+    measured_as(config(), happens)
+}
+
+/// Runs a measurement; `happens` may move motor and table in every cycle. Also returns the lost motion that is true, µm. The command keeps its acceleration.
+fn measured_as(config: BacklashConfig, happens: impl Fn(&mut Axis, f64)) -> (Backlash, f64) {
     let mut gib = Box::<Backlash>::default();
-    gib.start(Plan::new(&config())).expect("a good configuration");
+    gib.start(Plan::new(&config)).expect("a good configuration");
     let mut axis = Axis { ahead: 0.0, motor: 0.0, table: 0.0, since: 0, phase: 0, random: 1 };
     let mut out = *gib.output();
     for _ in 0..200_000 {
@@ -60,6 +65,9 @@ fn measured(happens: impl Fn(&mut Axis, f64)) -> (Backlash, f64) {
         if !gib.quick(&input) {
             gib.step(&input);
         }
+        let change = (gib.output().target_speed_mm_s - out.target_speed_mm_s).abs();
+        let most = 1.5 * gib.plan.acceleration * gib.plan.cycles_per_s;
+        assert!(change <= most + 1e-9, "{change} of {most} mm/s in a cycle, {} to {}", out.phase, gib.output().phase);
         out = *gib.output();
         axis.since = if out.phase == axis.phase { axis.since + 1 } else { 0 };
         axis.phase = out.phase;
@@ -96,6 +104,12 @@ fn jumps(axis: &mut Axis, before: f64, phase: i32, at: u32, jump: f64, back: f64
 #[test]
 fn an_axis_without_troubles_is_measured() {
     let (gib, truth) = measured(|_, _| ());
+    holds(&gib, truth);
+}
+
+#[test]
+fn the_command_keeps_its_acceleration_also_behind_the_probe() {
+    let (gib, truth) = measured_as(BacklashConfig { acceleration_mm_s2: 1.0, ..config() }, |_, _| ());
     holds(&gib, truth);
 }
 
