@@ -60,7 +60,7 @@ pub struct BacklashConfig {
     pub detection_limit_um: f64,
     /// Speed of moves between references, 0.1 to 500 mm/s (default 5).
     pub approach_speed_mm_s: f64,
-    /// Speed at which the sliding torque is read, 0.05 to 20 mm/s (default 1).
+    /// Speed at which the sliding torque is read, 0.05 to 20 mm/s (default 1): the lost motion is that of this speed.
     pub slide_speed_mm_s: f64,
     /// Travel over which the sliding torque is read, 0.1 to 100 mm and no less than 48 cycles at `slide_speed_mm_s` take (default 1, or
     /// that).

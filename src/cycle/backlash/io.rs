@@ -46,7 +46,7 @@ pub struct BacklashInput {
     pub compensation_um: f64,
     /// `request_id` of the last request that the kernel has carried out; 0 before the first.
     pub acknowledged_id: u32,
-    /// `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`; other bits must be 0.
+    /// `GIB_INPUT_FAULT`, `GIB_INPUT_ABORT`; other bits must be 0: they end a run with GIB_ERR_CONFIG.
     pub flags: u32,
 }
 

@@ -397,8 +397,12 @@ impl Backlash {
         if input.flags & GIB_INPUT_ABORT != 0 {
             return Some(Fault::of(GIB_ERR_ABORTED));
         }
-        if input.flags != 0 {
+        if input.flags & GIB_INPUT_FAULT != 0 {
             return Some(Fault::of(GIB_ERR_DRIVE_FAULT));
+        }
+        if input.flags != 0 {
+            let allowed = f64::from(GIB_INPUT_FAULT | GIB_INPUT_ABORT);
+            return fault(GIB_ERR_CONFIG, "flags\0", f64::from(input.flags), 0.0, allowed);
         }
         if !input.position_mm.is_finite() {
             return finite("position_mm\0", input.position_mm);

@@ -169,3 +169,13 @@ fn a_kernel_that_answers_and_leaves_another_amount_in_force_owes_the_restore() {
     gib.step(&answered(&gib, 0.5));
     assert_eq!(gib.report().restore_owed, 0);
 }
+
+#[test]
+fn unknown_flags_are_named_and_a_faulted_drive_is_one_with_them_too() {
+    for (flags, code) in [(1 << 7, GIB_ERR_CONFIG), (GIB_INPUT_FAULT | 1 << 7, GIB_ERR_DRIVE_FAULT)] {
+        let mut gib = Box::<Backlash>::default();
+        gib.start(Plan::new(&config())).expect("a good configuration");
+        gib.step(&BacklashInput { flags, ..BacklashInput::default() });
+        assert_eq!(gib.fault().code, code);
+    }
+}
