@@ -330,12 +330,16 @@ pub fn check_release(fit: &Fitted, levels: &Levels, returned: f64, slipped: bool
     // Where the release is known to lie before the curve, the way was counted from the turn.
     let counted = fit.turn_error > 0.0;
     let Some(wound) = fit.wound(levels, bin).filter(|_| !counted) else { return Ok(()) };
+    // Without a clearance its place is chance: the release ends no lower on the line than where the drive is slack.
+    let slack = levels.motor + 0.5 * (levels.before + levels.after).min(0.0);
+    let below = (slack - fit.level).max(0.0) / fit.stiffness;
+    let (found, wound) = (fit.held + below, wound + below);
     let share = if slipped { f64::INFINITY } else { SHARE * (wound - returned) };
     let least = share.min(SHORT * bin);
-    if fit.held < least {
-        let hidden = fit.variance.sqrt() > fit.held;
+    if found < least {
+        let hidden = fit.variance.sqrt() > found;
         let (code, field) = (if hidden { GIB_ERR_BACKLASH_NOISE } else { GIB_ERR_BACKLASH_SHAPE }, "release_um\0");
-        return Err(Fault { code, field, value: 1e3 * fit.held, low: 1e3 * least, high: f64::MAX });
+        return Err(Fault { code, field, value: 1e3 * found, low: 1e3 * least, high: f64::MAX });
     }
     Ok(())
 }
