@@ -325,8 +325,8 @@ pub fn check_reversal(fit: Option<&Fitted>, torque_nm: f64) -> Result<Fitted, Fa
 /// `GIB_ERR_BACKLASH_SHAPE` with the release that the curve shows, `_NOISE` where noise may hide it.
 pub fn check_release(fit: &Fitted, levels: &Levels, returned: f64, slipped: bool, bin: f64) -> Result<(), Fault> {
     /// Bins of release without which the first kink may be anywhere before them, and share of what was wound that is one.
-    const SHORT: f64 = 8.0;
-    const SHARE: f64 = 0.5;
+    const SHORT: f64 = 5.5;
+    const SHARE: f64 = 0.4;
     // Where the release is known to lie before the curve, the way was counted from the turn.
     let counted = fit.turn_error > 0.0;
     let Some(wound) = fit.wound(levels, bin).filter(|_| !counted) else { return Ok(()) };
@@ -442,6 +442,17 @@ mod tests {
         assert!((mean.lost_motion_um - 40.0).abs() < 1e-9, "{} µm", mean.lost_motion_um);
         senses[1].add(&Fitted { lost_motion: 0.06, ..fit }, &levels, None, 10.0);
         assert!((estimates(&both, 0.0, &senses).mean.lost_motion_um - 50.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_release_is_told_from_a_kink_that_is_chance() {
+        let levels = Levels { before: -4.0, after: 4.0, motor: 0.0, variance: 1e-6 };
+        let fit = Fitted { stiffness: 700.0, clearance: 0.002, held: 0.001, level: -1.5, ..Fitted::default() };
+        let said = |fit: &Fitted| check_release(fit, &levels, 0.0, false, 0.0005).map_err(|fault| fault.code);
+        // A line without a clearance, of which the table had released a part.
+        assert_eq!(said(&fit), Ok(()));
+        assert_eq!(said(&Fitted { held: 0.002, level: 0.0, ..fit }), Err(GIB_ERR_BACKLASH_SHAPE));
+        assert_eq!(said(&Fitted { held: 0.002, level: 0.0, variance: 1e-4, ..fit }), Err(GIB_ERR_BACKLASH_NOISE));
     }
 
     #[test]
