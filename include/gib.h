@@ -101,7 +101,7 @@
 #define GIB_ERR_STATE (-5)
 
 /**
- * The caller aborted; everything changed has been restored.
+ * The caller aborted. What was changed has been restored, but where the message is GIB_ERR_RESTORE_UNCONFIRMED.
  */
 #define GIB_ERR_ABORTED (-6)
 
@@ -206,7 +206,8 @@
 #define GIB_ERR_BACKLASH_RESOLUTION (-104)
 
 /**
- * The torque curve has not the shape of a release, a clearance and a wind-up.
+ * The torque curve has not the shape of a release, a clearance and a wind-up; also where the table has slipped, so that the release
+ * is not on it.
  */
 #define GIB_ERR_BACKLASH_SHAPE (-105)
 
@@ -1503,7 +1504,7 @@ typedef struct gib_backlash_config {
      */
     double feed_mm_s;
     /**
-     * Rest before each reversal, up to 10 s (default 0.2).
+     * Rest before each reversal, one cycle to 10 s (default 0.2); no less than 65 cycles are taken.
      */
     double settle_s;
     /**
@@ -1515,7 +1516,7 @@ typedef struct gib_backlash_config {
      */
     double reference_2_mm;
     /**
-     * Travel after a reversal within which the table must move, up to 5000 µm (default 500).
+     * Travel after a reversal within which the table must move, ten times `step_um` to 5000 µm (default 500).
      */
     double detection_limit_um;
     /**
@@ -1523,35 +1524,37 @@ typedef struct gib_backlash_config {
      */
     double approach_speed_mm_s;
     /**
-     * Speed at which the sliding torque is read, 0.05 to 20 mm/s (default 1).
+     * Speed at which the sliding torque is read, 0.05 to 20 mm/s (default 1): the lost motion is that of this speed.
      */
     double slide_speed_mm_s;
     /**
-     * Travel over which the sliding torque is read, 0.1 to 100 mm (default 1).
+     * Travel over which the sliding torque is read, 0.1 to 100 mm and no less than 48 cycles at `slide_speed_mm_s` take (default 1, or
+     * that).
      */
     double slide_mm;
     /**
-     * Largest commanded acceleration, 0.1 to 10000 mm/s² (default 50).
+     * Largest commanded acceleration, 0.1 to 10000 mm/s² (default 50). In the cycle in which a move ends it may be one and a half times
+     * that; GIB_INPUT_FAULT stops the command at once, and the steps of `GIB_BACKLASH_STEP` are jumps of the position.
      */
     double acceleration_mm_s2;
     /**
-     * Lowest motor position allowed, mm. Required, with `travel_max_mm`.
+     * Lowest motor position allowed, mm, from -1e6. Required, with `travel_max_mm`.
      */
     double travel_min_mm;
     /**
-     * Highest motor position allowed, mm. Required.
+     * Highest motor position allowed, mm, above the lowest and up to 1e6. Required.
      */
     double travel_max_mm;
     /**
-     * Largest |torque| allowed, N·m. Required.
+     * Largest |torque| allowed, 1e-6 to 1e6 N·m. Required.
      */
     double torque_bound_nm;
     /**
-     * Rated torque, N·m. Required for `GIB_TORQUE_PERMILLE`.
+     * Rated torque, 1e-6 to 1e6 N·m. Required for `GIB_TORQUE_PERMILLE`.
      */
     double rated_torque_nm;
     /**
-     * Largest |target - position| allowed, up to 100 mm (default 0.5).
+     * Largest |target - position| allowed, 0.001 to 100 mm (default 0.5).
      */
     double lag_limit_mm;
     /**
@@ -1559,7 +1562,8 @@ typedef struct gib_backlash_config {
      */
     double ack_timeout_s;
     /**
-     * Smallest change of the compensation amount that the kernel can store, up to 100 µm (default 1).
+     * Smallest change of the compensation amount that the kernel can store, 0.0001 to 100 µm (default 1). An amount asked for counts as
+     * in force within half of it: the kernel shall round to the nearest amount that it can store.
      */
     double compensation_resolution_um;
     /**
@@ -1659,13 +1663,15 @@ typedef struct gib_backlash_output {
  */
 typedef struct gib_backlash_estimate {
     /**
-     * Lost motion between steady slow motion one way and the other: clearance + 2·Ts/k.
+     * Lost motion between steady motion at `slide_speed_mm_s` one way and the other: clearance + 2·Ts/k, with the table's sliding torque Ts
+     * of that speed. Where friction goes by speed (viscous, Stribeck), set the speed that matters: at another the wind-up is another.
      */
     double lost_motion_um;
     /**
      * Its expanded uncertainty, k = 2. It holds what the table's presliding may be: where its bend shows, all that was taken
      * off once more, since how it bends is not known; where none shows, what noise may hide. A table whose friction gives way along
-     * a straight line until it slides looks like the drive's spring: nothing here finds that.
+     * a straight line until it slides looks like the drive's spring: nothing here finds that. Nor does it hold cogging or another ripple of
+     * the motor's torque with a period of 0.03 to 0.1 mm and 5 % of the friction or more, which bends the slopes alike in every repeat.
      */
     double uncertainty_um;
     /**
@@ -1735,7 +1741,7 @@ typedef struct gib_backlash_report {
      */
     struct gib_backlash_estimate each[2];
     /**
-     * Mean of both, or the first alone with `one_direction`.
+     * Mean of both; the first alone with `one_direction`, and for as long as the other was not measured.
      */
     struct gib_backlash_estimate mean;
     /**
@@ -1743,11 +1749,12 @@ typedef struct gib_backlash_report {
      */
     double old_value_um;
     /**
-     * Amount that gib asked the kernel to put in force, µm; 0 when none was written.
+     * Amount that gib asked the kernel to put in force, µm, not rounded to `compensation_resolution_um`; 0 when none was written.
      */
     double value_written_um;
     /**
-     * Amount that the kernel reported in force at the last confirmed request, µm.
+     * Amount that the kernel reported in force at the last confirmed request, µm: within half a `compensation_resolution_um` of what was
+     * asked for.
      */
     double value_active_um;
     /**
@@ -4569,11 +4576,14 @@ int32_t gib_backlash_start(struct gib_backlash *handle,
  *
  * While `owns_motion` is 1, follow `target_position_mm` and report the motor's position and torque of the same
  * instant. When `request_id` changes, put `compensation_um` and `reversal_acceleration_off` in force and report the
- * number in `acknowledged_id` and the amount in force in `compensation_um`.
+ * number in `acknowledged_id` and the amount in force in `compensation_um`, within half a `compensation_resolution_um` of the one asked for.
  *
  * A fault is named in `message` in the cycle in which it is found. In that cycle the command already brakes from its own last
  * speed, no harder than `acceleration_mm_s2`, whatever is measured; with GIB_INPUT_FAULT, when the axis follows no command, it stays
  * where it is. Then everything changed is restored; while that goes on the status is GIB_BUSY, and only then the error.
+ *
+ * A call without input or output does nothing but say so: the command stands where it was, at speed 0, time stands still for the
+ * measurement, and the next whole call goes on from there. After more than a few such cycles abort.
  *
  * @param handle the instance.
  * @param input measured values of this cycle.

@@ -20,7 +20,7 @@ pub const GIB_ERR_CONFIG: i32 = -3;
 pub const GIB_ERR_STRUCT_SIZE: i32 = -4;
 /// The call is not legal in the present state (see the function's `[state: …]`).
 pub const GIB_ERR_STATE: i32 = -5;
-/// The caller aborted; everything changed has been restored.
+/// The caller aborted. What was changed has been restored, but where the message is GIB_ERR_RESTORE_UNCONFIRMED.
 pub const GIB_ERR_ABORTED: i32 = -6;
 /// An internal fault was caught at the boundary. Please report it.
 pub const GIB_ERR_INTERNAL: i32 = -7;
@@ -63,7 +63,8 @@ pub const GIB_ERR_BACKLASH_NOISE: i32 = -102;
 pub const GIB_ERR_BACKLASH_DIRECTIONS: i32 = -103;
 /// The lost motion is smaller than the encoder or the noise can resolve.
 pub const GIB_ERR_BACKLASH_RESOLUTION: i32 = -104;
-/// The torque curve has not the shape of a release, a clearance and a wind-up.
+/// The torque curve has not the shape of a release, a clearance and a wind-up; also where the table has slipped, so that the release
+/// is not on it.
 pub const GIB_ERR_BACKLASH_SHAPE: i32 = -105;
 /// The share of friction on the motor side could not be told from the wind-up.
 pub const GIB_ERR_BACKLASH_MOTOR_FRICTION: i32 = -106;
@@ -208,7 +209,7 @@ const TEXTS: &[(i32, &str)] = &[
     (GIB_ERR_CONFIG, "a configuration value is out of range\0"),
     (GIB_ERR_STRUCT_SIZE, "struct_size is too short, or an unknown tail is not zero\0"),
     (GIB_ERR_STATE, "this call is not legal in the present state\0"),
-    (GIB_ERR_ABORTED, "aborted by the caller; everything changed was restored\0"),
+    (GIB_ERR_ABORTED, "aborted by the caller\0"),
     (GIB_ERR_INTERNAL, "internal fault, caught at the boundary\0"),
     (GIB_ERR_MEMORY, "no memory, or the memory given is too small or misaligned\0"),
     (GIB_ERR_BUFFER, "the buffer is too small\0"),

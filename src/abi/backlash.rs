@@ -133,11 +133,14 @@ pub unsafe extern "C" fn gib_backlash_start(handle: *mut GibBacklash, config: *c
 ///
 /// While `owns_motion` is 1, follow `target_position_mm` and report the motor's position and torque of the same
 /// instant. When `request_id` changes, put `compensation_um` and `reversal_acceleration_off` in force and report the
-/// number in `acknowledged_id` and the amount in force in `compensation_um`.
+/// number in `acknowledged_id` and the amount in force in `compensation_um`, within half a `compensation_resolution_um` of the one asked for.
 ///
 /// A fault is named in `message` in the cycle in which it is found. In that cycle the command already brakes from its own last
 /// speed, no harder than `acceleration_mm_s2`, whatever is measured; with GIB_INPUT_FAULT, when the axis follows no command, it stays
 /// where it is. Then everything changed is restored; while that goes on the status is GIB_BUSY, and only then the error.
+///
+/// A call without input or output does nothing but say so: the command stands where it was, at speed 0, time stands still for the
+/// measurement, and the next whole call goes on from there. After more than a few such cycles abort.
 ///
 /// @param handle the instance.
 /// @param input measured values of this cycle.

@@ -50,35 +50,38 @@ pub struct BacklashConfig {
     pub dwell_s: f64,
     /// Speed of the slow feed, and of the last 0.1 mm of motor travel to each reversal, 0.001 to 5 mm/s (default 0.1).
     pub feed_mm_s: f64,
-    /// Rest before each reversal, up to 10 s (default 0.2).
+    /// Rest before each reversal, one cycle to 10 s (default 0.2); no less than 65 cycles are taken.
     pub settle_s: f64,
     /// Reversal position of the first sense, mm.
     pub reference_1_mm: f64,
     /// Reversal position of the second sense, mm.
     pub reference_2_mm: f64,
-    /// Travel after a reversal within which the table must move, up to 5000 µm (default 500).
+    /// Travel after a reversal within which the table must move, ten times `step_um` to 5000 µm (default 500).
     pub detection_limit_um: f64,
     /// Speed of moves between references, 0.1 to 500 mm/s (default 5).
     pub approach_speed_mm_s: f64,
-    /// Speed at which the sliding torque is read, 0.05 to 20 mm/s (default 1).
+    /// Speed at which the sliding torque is read, 0.05 to 20 mm/s (default 1): the lost motion is that of this speed.
     pub slide_speed_mm_s: f64,
-    /// Travel over which the sliding torque is read, 0.1 to 100 mm (default 1).
+    /// Travel over which the sliding torque is read, 0.1 to 100 mm and no less than 48 cycles at `slide_speed_mm_s` take (default 1, or
+    /// that).
     pub slide_mm: f64,
-    /// Largest commanded acceleration, 0.1 to 10000 mm/s² (default 50).
+    /// Largest commanded acceleration, 0.1 to 10000 mm/s² (default 50). In the cycle in which a move ends it may be one and a half times
+    /// that; GIB_INPUT_FAULT stops the command at once, and the steps of `GIB_BACKLASH_STEP` are jumps of the position.
     pub acceleration_mm_s2: f64,
-    /// Lowest motor position allowed, mm. Required, with `travel_max_mm`.
+    /// Lowest motor position allowed, mm, from -1e6. Required, with `travel_max_mm`.
     pub travel_min_mm: f64,
-    /// Highest motor position allowed, mm. Required.
+    /// Highest motor position allowed, mm, above the lowest and up to 1e6. Required.
     pub travel_max_mm: f64,
-    /// Largest |torque| allowed, N·m. Required.
+    /// Largest |torque| allowed, 1e-6 to 1e6 N·m. Required.
     pub torque_bound_nm: f64,
-    /// Rated torque, N·m. Required for `GIB_TORQUE_PERMILLE`.
+    /// Rated torque, 1e-6 to 1e6 N·m. Required for `GIB_TORQUE_PERMILLE`.
     pub rated_torque_nm: f64,
-    /// Largest |target - position| allowed, up to 100 mm (default 0.5).
+    /// Largest |target - position| allowed, 0.001 to 100 mm (default 0.5).
     pub lag_limit_mm: f64,
     /// Time within which a request must be acknowledged, 2 cycles to 60 s (default 1).
     pub ack_timeout_s: f64,
-    /// Smallest change of the compensation amount that the kernel can store, up to 100 µm (default 1).
+    /// Smallest change of the compensation amount that the kernel can store, 0.0001 to 100 µm (default 1). An amount asked for counts as
+    /// in force within half of it: the kernel shall round to the nearest amount that it can store.
     pub compensation_resolution_um: f64,
     /// Largest amount that may be written, up to 5000 µm (default: the detection limit).
     pub compensation_max_um: f64,

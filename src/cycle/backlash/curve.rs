@@ -8,7 +8,7 @@
 pub const BINS: usize = 1024;
 
 /// Bins emptied in one cycle.
-const CLEAR_BINS: usize = 16;
+pub const CLEAR_BINS: usize = 16;
 /// Slices of `Curve::clear`.
 pub const CLEAR_SLICES: u32 = (BINS / CLEAR_BINS) as u32;
 

@@ -58,6 +58,19 @@ pub struct Fitted {
 }
 
 impl Fitted {
+    /// How far the drive was wound at the end of sliding, from which the release begins, mm; `None` where a load that no friction holds
+    /// never lets the spring go slack. `bin`: of the curve, mm.
+    #[must_use]
+    pub fn wound(&self, levels: &Levels, bin: f64) -> Option<f64> {
+        let (middle, change) = (0.5 * (levels.before + levels.after), levels.spring_change());
+        if middle.abs() > 0.5 * change {
+            return None;
+        }
+        // One straight line does not tell whether the middle is a load or the sensor's zero: the one that leaves less counts.
+        let slack = if self.clearance < bin { levels.motor + middle.min(0.0) } else { self.level };
+        Some(((slack - levels.before - 2.0 * levels.motor) / self.stiffness).max(0.0))
+    }
+
     /// What the curve says where the table does not give way before it slides.
     #[must_use]
     pub fn straight(&self) -> Rounded {

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! Idle → Begin → Clear → for each reversal (Approach → SlideBack → SlideIn → CreepIn → Settle → Scan → Unwind → ProbeBack → Unwind →
-//!                                   ProbeForth → Evaluate) → Write → Done
+//!                                   ProbeForth → Rest → Evaluate) → Write → Done
 //!          any state ──fault, abort, deadline, refusal──▶ leave: Stopping → Restore → Failed
 //! ```
 //!
@@ -25,6 +25,8 @@ mod door;
 mod measure;
 mod quick;
 mod readings;
+#[cfg(test)]
+mod tests;
 
 use readings::{Probe, Watch};
 
@@ -55,6 +57,8 @@ enum Phase {
     ProbeBack,
     /// Ends when the motor has come forth again.
     ProbeForth,
+    /// Ends when the command stands.
+    Rest,
     /// Ends when the peak rule has seen bin `bin` and all after it.
     EvaluatePeak { bin: usize },
     /// Ends when the fit stands.
@@ -116,6 +120,8 @@ pub struct Backlash {
     turn_command: f64,
     /// Furthest that the motor came before the scan, in the sense of the scan: the lowest.
     furthest: f64,
+    /// The table broke away in the old sense during the scan, and the curve was begun anew where the motor turned.
+    slipped: bool,
     profile: Profile,
     last_position: f64,
     smallest_change: f64,
@@ -158,6 +164,7 @@ impl Default for Backlash {
             turn: 0.0,
             turn_command: 0.0,
             furthest: f64::INFINITY,
+            slipped: false,
             profile: Profile::default(),
             last_position: 0.0,
             smallest_change: f64::INFINITY,
@@ -446,7 +453,7 @@ impl Backlash {
             Phase::SlideIn | Phase::CreepIn => GIB_BACKLASH_SLIDE_IN,
             Phase::Settle => GIB_BACKLASH_SETTLE,
             Phase::Scan => GIB_BACKLASH_SCAN,
-            Phase::Unwind { .. } | Phase::ProbeBack | Phase::ProbeForth => GIB_BACKLASH_PROBE,
+            Phase::Unwind { .. } | Phase::ProbeBack | Phase::ProbeForth | Phase::Rest => GIB_BACKLASH_PROBE,
             Phase::EvaluatePeak { .. } | Phase::EvaluateFit | Phase::Conclude => GIB_BACKLASH_EVALUATE,
             Phase::Write { .. } => GIB_BACKLASH_WRITE,
             Phase::Stopping => GIB_BACKLASH_STOPPING,

@@ -130,7 +130,7 @@ impl Plan {
         let first_direction = in_range("first_direction\0", f64::from(c.first_direction), -1.0, 1.0)?;
         let slide_speed = in_range("slide_speed_mm_s\0", or(c.slide_speed_mm_s, 1.0), 0.05, 20.0)?;
         let shortest_slide = (0.1f64).max(slide_speed * cycle * 4.0 * LEVEL_BATCHES);
-        let slide = in_range("slide_mm\0", or(c.slide_mm, 1.0), shortest_slide, 100.0)?;
+        let slide = in_range("slide_mm\0", or(c.slide_mm, shortest_slide.max(1.0)), shortest_slide, 100.0)?;
         let approach = in_range("approach_speed_mm_s\0", or(c.approach_speed_mm_s, 5.0), 0.1, 500.0)?;
         let acceleration = in_range("acceleration_mm_s2\0", or(c.acceleration_mm_s2, 50.0), 0.1, 10000.0)?;
         let low = in_range("travel_min_mm\0", c.travel_min_mm, -1e6, 1e6)?;
@@ -177,7 +177,8 @@ impl Plan {
             torque_nm,
             lag_limit: in_range("lag_limit_mm\0", or(c.lag_limit_mm, 0.5), 1e-3, 100.0)?,
             ack_timeout: cycles(in_range("ack_timeout_s\0", or(c.ack_timeout_s, 1.0), 2.0 * cycle, 60.0)?),
-            compensation_tolerance_um: resolution,
+            // What rounding takes or adds, and the last digit of a kernel that rounds between two amounts.
+            compensation_tolerance_um: 0.500_001 * resolution,
             compensation_max_um: in_range("compensation_max_um\0", or(c.compensation_max_um, limit_um), 0.0, 5000.0)?,
             encoder: in_range("encoder_um\0", c.encoder_um, 0.0, 100.0)? * 1e-3,
             batch: (slide / (slide_speed * cycle) / LEVEL_BATCHES) as u32,
@@ -200,6 +201,13 @@ impl Plan {
     #[must_use]
     pub fn run_in(&self) -> f64 {
         CREEP + self.slide + self.limit + self.lag_limit + 2.0 * self.slide_speed * self.slide_speed / self.acceleration
+    }
+
+    /// How far a motor that stands may be off the place where it was read, mm: no more than the curve leaves out at its begin.
+    #[inline(always)]
+    #[must_use]
+    pub fn stands(&self) -> f64 {
+        2.0 * self.bin
     }
 
     /// Furthest that a command goes from the reversal during scan and probe.
@@ -253,6 +261,21 @@ mod tests {
         assert_eq!(Plan::new(&missing).unwrap_err().field, "torque_bound_nm\0");
         let permille = BacklashConfig { torque_unit: GIB_TORQUE_PERMILLE, ..valid() };
         assert_eq!(Plan::new(&permille).unwrap_err().field, "rated_torque_nm\0");
+    }
+
+    #[test]
+    fn no_default_is_refused() {
+        for cycle_s in [5e-5, 0.001, 0.02] {
+            for slide_speed_mm_s in [0.05, 1.0, 20.0] {
+                for step_um in [0.1, 50.0] {
+                    let plan = Plan::new(&BacklashConfig { cycle_s, slide_speed_mm_s, step_um, ..valid() });
+                    assert!(
+                        plan.is_ok_and(|plan| plan.batch >= 4),
+                        "{cycle_s} s, {slide_speed_mm_s} mm/s, {step_um} µm"
+                    );
+                }
+            }
+        }
     }
 
     #[test]

@@ -17,11 +17,13 @@ use crate::error::{
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct BacklashEstimate {
-    /// Lost motion between steady slow motion one way and the other: clearance + 2·Ts/k.
+    /// Lost motion between steady motion at `slide_speed_mm_s` one way and the other: clearance + 2·Ts/k, with the table's sliding torque Ts
+    /// of that speed. Where friction goes by speed (viscous, Stribeck), set the speed that matters: at another the wind-up is another.
     pub lost_motion_um: f64,
     /// Its expanded uncertainty, k = 2. It holds what the table's presliding may be: where its bend shows, all that was taken
     /// off once more, since how it bends is not known; where none shows, what noise may hide. A table whose friction gives way along
-    /// a straight line until it slides looks like the drive's spring: nothing here finds that.
+    /// a straight line until it slides looks like the drive's spring: nothing here finds that. Nor does it hold cogging or another ripple of
+    /// the motor's torque with a period of 0.03 to 0.1 mm and 5 % of the friction or more, which bends the slopes alike in every repeat.
     pub uncertainty_um: f64,
     /// Part of it that is clearance.
     pub clearance_um: f64,
@@ -59,13 +61,14 @@ pub struct BacklashEstimate {
 pub struct BacklashReport {
     /// After motion in the first direction, then in the other; all zero where not measured.
     pub each: [BacklashEstimate; 2],
-    /// Mean of both, or the first alone with `one_direction`.
+    /// Mean of both; the first alone with `one_direction`, and for as long as the other was not measured.
     pub mean: BacklashEstimate,
     /// Amount in force when the measurement began, µm.
     pub old_value_um: f64,
-    /// Amount that gib asked the kernel to put in force, µm; 0 when none was written.
+    /// Amount that gib asked the kernel to put in force, µm, not rounded to `compensation_resolution_um`; 0 when none was written.
     pub value_written_um: f64,
-    /// Amount that the kernel reported in force at the last confirmed request, µm.
+    /// Amount that the kernel reported in force at the last confirmed request, µm: within half a `compensation_resolution_um` of what was
+    /// asked for.
     pub value_active_um: f64,
     /// `GIB_DONE`, `GIB_BUSY`, `GIB_OK` before a start, or the first error, also once an operator's wish was carried out since.
     pub status: i32,
@@ -233,7 +236,7 @@ impl Sense {
 pub struct Estimates {
     /// A sense that was not measured is all zero.
     pub each: [BacklashEstimate; 2],
-    /// Mean of both, or the one.
+    /// Mean of both, or the one that was measured.
     pub mean: BacklashEstimate,
     /// The table's presliding that was taken off, in ‰ of the mean's lost motion; 0 where none shows.
     pub presliding_permille: i32,
@@ -255,7 +258,7 @@ pub fn estimates(plan: &Plan, encoder: f64, senses: &[Sense; 2]) -> Estimates {
         if told { (1e3 * give.mean() / (straight - give.mean()).max(f64::MIN_POSITIVE)).min(1e6) } else { 0.0 };
     let presliding_permille = (permille + 0.5) as i32;
     let first = senses[0].estimate(plan, told, common, &senses[1]);
-    if plan.senses == 1 {
+    if senses[1].reversals == 0.0 {
         return Estimates { each: [first, BacklashEstimate::default()], mean: first, presliding_permille };
     }
     let second = senses[1].estimate(plan, told, common, &senses[0]);
@@ -313,6 +316,32 @@ pub fn check_reversal(fit: Option<&Fitted>, torque_nm: f64) -> Result<Fitted, Fa
         });
     }
     Ok(*fit)
+}
+
+/// Says whether the curve begins with the release. A table that has slipped before the turn leaves the drive slack, and what the motor
+/// crossed of the clearance is on no curve. `returned` (mm): the motor's way back before the curve; `bin` (mm): of the curve.
+///
+/// # Errors
+/// `GIB_ERR_BACKLASH_SHAPE` with the release that the curve shows, `_NOISE` where noise may hide it.
+pub fn check_release(fit: &Fitted, levels: &Levels, returned: f64, slipped: bool, bin: f64) -> Result<(), Fault> {
+    /// Bins of release without which the first kink may be anywhere before them, and share of what was wound that is one.
+    const SHORT: f64 = 5.5;
+    const SHARE: f64 = 0.4;
+    // Where the release is known to lie before the curve, the way was counted from the turn.
+    let counted = fit.turn_error > 0.0;
+    let Some(wound) = fit.wound(levels, bin).filter(|_| !counted) else { return Ok(()) };
+    // Without a clearance its place is chance: the release ends no lower on the line than where the drive is slack.
+    let slack = levels.motor + 0.5 * (levels.before + levels.after).min(0.0);
+    let below = (slack - fit.level).max(0.0) / fit.stiffness;
+    let (found, wound) = (fit.held + below, wound + below);
+    let share = if slipped { f64::INFINITY } else { SHARE * (wound - returned) };
+    let least = share.min(SHORT * bin);
+    if found < least {
+        let hidden = fit.variance.sqrt() > found;
+        let (code, field) = (if hidden { GIB_ERR_BACKLASH_NOISE } else { GIB_ERR_BACKLASH_SHAPE }, "release_um\0");
+        return Err(Fault { code, field, value: 1e3 * found, low: 1e3 * least, high: f64::MAX });
+    }
+    Ok(())
 }
 
 /// Says whether curve and probe found the same friction on the motor's side: across a clearance the motor has nothing else to
@@ -400,6 +429,31 @@ pub fn check_result(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_sense_that_was_not_measured_yet_halves_nothing() {
+        let fit = Fitted { lost_motion: 0.04, variance: 1e-8, clearance: 0.03, stiffness: 700.0, ..Fitted::default() };
+        let levels = Levels { before: -4.0, after: 4.0, motor: 0.0, variance: 1e-6 };
+        let mut senses = [Sense::default(); 2];
+        senses[0].add(&fit, &levels, None, 10.0);
+        let both = Plan { senses: 2, ..Plan::REST };
+        let Estimates { each, mean, .. } = estimates(&both, 0.0, &senses);
+        assert_eq!((each[1], mean), (BacklashEstimate::default(), each[0]));
+        assert!((mean.lost_motion_um - 40.0).abs() < 1e-9, "{} µm", mean.lost_motion_um);
+        senses[1].add(&Fitted { lost_motion: 0.06, ..fit }, &levels, None, 10.0);
+        assert!((estimates(&both, 0.0, &senses).mean.lost_motion_um - 50.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_release_is_told_from_a_kink_that_is_chance() {
+        let levels = Levels { before: -4.0, after: 4.0, motor: 0.0, variance: 1e-6 };
+        let fit = Fitted { stiffness: 700.0, clearance: 0.002, held: 0.001, level: -1.5, ..Fitted::default() };
+        let said = |fit: &Fitted| check_release(fit, &levels, 0.0, false, 0.0005).map_err(|fault| fault.code);
+        // A line without a clearance, of which the table had released a part.
+        assert_eq!(said(&fit), Ok(()));
+        assert_eq!(said(&Fitted { held: 0.002, level: 0.0, ..fit }), Err(GIB_ERR_BACKLASH_SHAPE));
+        assert_eq!(said(&Fitted { held: 0.002, level: 0.0, variance: 1e-4, ..fit }), Err(GIB_ERR_BACKLASH_NOISE));
+    }
 
     #[test]
     fn the_probe_is_held_against_a_short_clearance_that_shows() {

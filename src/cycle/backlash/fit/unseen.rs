@@ -36,16 +36,8 @@ impl Fit {
     /// Whether the first kink lies where no fit can see it: with too few bins before it.
     pub(super) fn find_unseen(&self, curve: &Curve) -> Option<Unseen> {
         let (returned, fitted) = (self.returned?, self.chosen?);
-        let levels = &self.levels;
-        let (middle, change) = (0.5 * (levels.before + levels.after), levels.spring_change());
-        // A load that no friction holds never lets the spring go slack: there is no clearance to cross.
-        if middle.abs() > 0.5 * change {
-            return None;
-        }
-        // One straight line does not tell whether the middle is a load or the sensor's zero: the one that leaves less counts.
-        let straight = fitted.clearance < curve.width_mm();
-        let slack = if straight { levels.motor + middle.min(0.0) } else { fitted.level };
-        let wound = ((slack - levels.before - 2.0 * levels.motor) / fitted.stiffness).max(0.0);
+        // A load that no friction holds leaves no clearance to cross.
+        let wound = fitted.wound(&self.levels, curve.width_mm())?;
         let unseen = Unseen { returned, wound, friction: 0.5 * fitted.windup };
         (wound - returned < (SKIP + FEWEST_BINS) * curve.width_mm()).then_some(unseen)
     }

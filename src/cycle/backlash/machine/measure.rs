@@ -25,6 +25,11 @@ impl Backlash {
                 }
             }
             Phase::CreepIn => self.creep(input),
+            Phase::Rest => {
+                if self.profile.step() {
+                    self.probed();
+                }
+            }
             Phase::Settle => self.settle(input),
             Phase::EvaluatePeak { bin } => self.evaluate_peak(bin),
             Phase::EvaluateFit => {
@@ -113,6 +118,7 @@ impl Backlash {
             self.move_to(Phase::SlideIn, goal, self.plan.slide_speed);
         } else {
             self.furthest = f64::INFINITY;
+            self.slipped = false;
             self.move_to(Phase::CreepIn, self.references[self.index & 1], self.plan.feed.min(self.plan.slide_speed));
         }
     }
@@ -143,7 +149,7 @@ impl Backlash {
     /// Keeps the motor's furthest point before the scan: a servo that overshoots comes back from it, and may release the wind-up, before the
     /// scan begins.
     #[inline(always)]
-    fn see_furthest(&mut self, input: &BacklashInput) {
+    pub(super) fn see_furthest(&mut self, input: &BacklashInput) {
         self.furthest = self.furthest.min(self.sense * input.position_mm);
     }
 
@@ -203,12 +209,36 @@ impl Backlash {
             }
         }
         let travel = self.sense * (input.position_mm - self.turn);
+        if travel < -self.plan.stands() {
+            return self.go_on(input);
+        }
         let torque = self.sense * input.torque;
         self.curve_mut().add(travel, torque);
         self.watch.add(travel, torque, &self.plan);
         if over || (travel >= self.watch.end && self.watch.slides(travel, &self.plan)) {
             self.end_scan(input, travel);
         }
+    }
+
+    /// The motor still goes on in the old sense: a table that stuck has broken away in it, driven by what the servo had summed up. The
+    /// curve begins anew where the motor turns.
+    #[cold]
+    fn go_on(&mut self, input: &BacklashInput) {
+        let bin = self.plan.bin;
+        let curve = self.curve_mut();
+        let used = curve.used();
+        // The new sense had no time yet for more than a cycle may empty.
+        curve.clear(0);
+        curve.start(bin);
+        if used > curve::CLEAR_BINS {
+            let (code, high) = (GIB_ERR_BACKLASH_SHAPE, 1e3 * bin * curve::CLEAR_BINS as f64);
+            let value = 1e3 * bin * used as f64;
+            return self.leave(Fault { code, field: "travel_before_slip_um\0", value, low: 0.0, high });
+        }
+        self.turn = input.position_mm;
+        self.furthest = self.sense * self.turn;
+        self.slipped = true;
+        self.watch.again(self.plan.limit);
     }
 
     /// The curve of the present sense.
@@ -313,14 +343,15 @@ impl Backlash {
         } else if self.phase == Phase::ProbeBack {
             self.unwind(input, true);
         } else {
-            self.probed();
+            self.profile.stop();
+            let bound = self.profile.cycles_bound();
+            self.enter(Phase::Rest, bound);
         }
     }
 
     /// All of one reversal is recorded.
     #[cold]
     fn probed(&mut self) {
-        self.profile.halt();
         let (twice, twice_variance) = self.probe.difference();
         let motor = (0.5 * twice).max(0.0);
         if let Err(fault) = self.probe.check(twice, twice_variance, [self.before.mean(), self.after.mean()]) {
@@ -344,11 +375,18 @@ impl Backlash {
             }
         }
         if bin + PEAK_SLICE >= curve.used() {
-            self.fit.start(self.levels, 0.0, Some((self.sense * self.turn - self.furthest).max(0.0)));
+            // Where the table has slipped, nothing but the curve tells how far the drive is wound.
+            let returned = Some(self.returned()).filter(|_| !self.slipped);
+            self.fit.start(self.levels, 0.0, returned);
             self.enter(Phase::EvaluateFit, f64::from(Fit::slices_bound()));
         } else {
             self.phase = Phase::EvaluatePeak { bin: bin + PEAK_SLICE };
         }
+    }
+
+    /// The motor's way from its furthest point to where the curve begins, mm.
+    fn returned(&self) -> f64 {
+        (self.sense * self.turn - self.furthest).max(0.0)
     }
 
     /// One reversal is evaluated: next one, or the end.
@@ -356,6 +394,7 @@ impl Backlash {
     fn conclude(&mut self) {
         let index = self.index;
         let sound = verdict::check_reversal(self.fit.result(), self.plan.torque_nm).and_then(|fitted| {
+            verdict::check_release(&fitted, &self.levels, self.returned(), self.slipped, self.plan.bin)?;
             verdict::check_motor(&fitted, &self.levels, self.plan.torque_nm)?;
             verdict::check_load(&self.plan, &self.levels).map(|()| fitted)
         });

@@ -21,7 +21,11 @@ impl Backlash {
                 self.read_level(input);
                 true
             }
-            Phase::Approach | Phase::CreepIn => true,
+            Phase::Approach => true,
+            Phase::CreepIn => {
+                self.see_furthest(input);
+                true
+            }
             _ => false,
         };
         if done {
@@ -37,7 +41,7 @@ impl Backlash {
         let travel = self.sense * (input.position_mm - self.turn);
         let torque = self.sense * input.torque;
         let smooth = self.watch.next(torque);
-        if smooth > self.watch.news || travel >= self.watch.end {
+        if smooth > self.watch.news || travel >= self.watch.end || travel < -self.plan.stands() {
             return false;
         }
         if self.plan.slow_feed {

@@ -81,6 +81,11 @@ impl Watch {
         }
     }
 
+    /// Begins anew, where the table has slipped.
+    pub(super) fn again(&mut self, limit: f64) {
+        *self = Watch { smooth: -1.0, news: -1.0, highest: -1.0, highest_at: 0.0, high_at: 0.0, end: limit, ..*self };
+    }
+
     /// The smoothed torque once this sample is in.
     #[inline(always)]
     pub(super) fn next(&self, torque: f64) -> f64 {
