@@ -127,3 +127,32 @@ fn work_that_takes_longer_than_a_second_shows_progress() {
     let shown = on_a_terminal(folder, "predict --machine many.json --recording r.csv --out p.csv");
     assert!(shown.contains(" s predicting axis x") && shown.ends_with("\r\x1b[K"), "{shown:?}");
 }
+
+#[test]
+fn a_prediction_has_a_row_for_each_that_was_read_and_says_what_it_left_out() {
+    let folder = folder();
+    let folder = folder.path();
+    let text = fs::read_to_string(folder.join("r.csv")).unwrap();
+    let mut lines: Vec<String> = text.lines().take(5000).map(str::to_owned).collect();
+    // A spoilt torque in row 4001, and row 3000 three times.
+    let (kept, _) = lines[4000].rsplit_once(',').unwrap();
+    lines[4000] = format!("{kept},5000");
+    let repeated = lines[2999].clone();
+    lines.splice(3000..3000, [repeated.clone(), repeated.clone()]);
+    fs::write(folder.join("spoilt.csv"), lines.join("\n")).unwrap();
+    let said = gib(folder, "predict --machine m.json --recording spoilt.csv --out p.csv");
+    let text = String::from_utf8_lossy(&said.stdout);
+    for told in ["2 rows repeat the time", "5001 rows written", "x.torque_nm: is 5000"] {
+        assert!(text.contains(told), "{text}");
+    }
+    let predicted = fs::read_to_string(folder.join("p.csv")).unwrap();
+    let predicted: Vec<Vec<&str>> = predicted.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(predicted.len(), lines.len());
+    for (row, (given, predicted)) in lines.iter().zip(&predicted).enumerate().skip(1) {
+        let time = |cell: &str| cell.parse::<f64>().unwrap();
+        assert_eq!(time(given.split(',').next().unwrap()), time(predicted[0]), "row {}", row + 1);
+        assert_eq!(predicted.len(), 6, "row {}", row + 1);
+        let empty = predicted[1..].iter().all(|cell| cell.is_empty());
+        assert_eq!(empty, row == 3000 || row == 3001, "row {}", row + 1);
+    }
+}
