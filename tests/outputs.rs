@@ -45,7 +45,8 @@ fn an_output_that_would_lose_another_file_is_refused_before_the_work() {
         (format!("{diagnose} new.json --machine-out ./new.json"), "--json"),
         (format!("{diagnose} new.json --machine-out m.json"), "--machine"),
         (format!("{diagnose} keep.json --machine-out none/x.json"), "none/x.json"),
-        ("lost-motion --recording r.csv --plot r.csv".to_owned(), "--recording"),
+        ("simulate --machine m.json --moves test --stroke-mm 0 --out s.csv".to_owned(), "--stroke-mm is 0 mm"),
+        ("lost-motion r.csv --plot link".to_owned(), "<RECORDING>"),
         ("diagnose --machine m.json --recording r.csv --holdout link".to_owned(), "--holdout"),
     ] {
         let said = gib(folder, &arguments);

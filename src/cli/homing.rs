@@ -55,7 +55,7 @@ impl HomingCommand {
         if let Some(limit) = self.limit.filter(|limit| !(*limit > 0.0 && limit.is_finite())) {
             return Err(format!("--limit is {limit}; expected a number above 0").into());
         }
-        let mut outputs = Outputs::beside(&[("--recording", Some(&*self.recording))]);
+        let mut outputs = Outputs::beside(&[("<RECORDING>", Some(&*self.recording))]);
         outputs.add("--plot", self.plot.as_deref())?;
         let recording = Recording::open(&self.recording)?;
         let channel = super::axis(&recording, self.axis.as_deref())?;

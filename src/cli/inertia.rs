@@ -70,7 +70,7 @@ impl InertiaCommand {
     /// Measures and tells.
     pub fn run(&self) -> Result {
         let mut outputs =
-            Outputs::beside(&[("--recording", Some(&*self.recording)), ("--program", self.program.as_deref())]);
+            Outputs::beside(&[("<RECORDING>", Some(&*self.recording)), ("--program", self.program.as_deref())]);
         outputs.add("--plot", self.plot.as_deref())?;
         if let Some(file) = &self.program
             && let Some(entry) = program::get(file, self.step)?

@@ -169,7 +169,8 @@ impl Simulate {
             if !(value >= low && value <= high) {
                 let left_out = option == "--acceleration-mm-s2" && self.acceleration_mm_s2.is_none();
                 let why = if left_out { ", which half the torque limit gives; give it" } else { "" };
-                return Err(format!("{option} is {value:e} {unit}{why}; write a number from {low:e} to {high:e}"));
+                let value = if value == 0.0 { "0".to_owned() } else { format!("{value:e}") };
+                return Err(format!("{option} is {value} {unit}{why}; write a number from {low:e} to {high:e}"));
             }
         }
         Ok(reach)

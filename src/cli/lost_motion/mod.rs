@@ -64,7 +64,7 @@ enum Method {
 impl LostMotionCommand {
     /// Measures and tells.
     pub fn run(&self) -> Result {
-        let inputs = [("--recording", Some(&*self.recording)), ("--machine", self.machine.as_deref())];
+        let inputs = [("<RECORDING>", Some(&*self.recording)), ("--machine", self.machine.as_deref())];
         let mut outputs = Outputs::beside(&inputs);
         outputs.add("--plot", self.plot.as_deref())?;
         let recording = Recording::open(&self.recording)?;
