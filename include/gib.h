@@ -5020,10 +5020,12 @@ int32_t gib_diagnosis_machine(const struct gib_diagnosis *handle,
                               struct gib_machine *machine);
 
 /**
- * Why the last call failed, as a sentence that names file, row and column, what was found and what is allowed.
+ * Why the last call failed, as a sentence that names file, row and column, what was found and what is allowed. Each
+ * call of this family on the handle but gib_diagnosis_abort forgets the sentence of the one before and leaves its own if
+ * it fails; a call that is refused because of the handle itself, or because another thread works, leaves none.
  *
  * @param handle the instance.
- * @param text receives the sentence, UTF-8, with its NUL; empty when nothing went wrong.
+ * @param text receives the sentence, UTF-8, with its NUL; empty when the last call did its work.
  * @param size bytes at `text`; a longer sentence is cut.
  * @return GIB_OK; GIB_ERR_BUFFER when the sentence was cut; GIB_ERR_STATE while another thread works; GIB_ERR_NULL,
  * GIB_ERR_HANDLE.
@@ -5622,7 +5624,8 @@ int32_t gib_machine_ignored_keys(const struct gib_machine *handle,
 
 /**
  * Why the last call failed, as a sentence that names the file or the path in the JSON, what was found and what is
- * allowed.
+ * allowed. Each call of this family on the handle forgets the sentence of the one before and leaves its own if it
+ * fails; a call that is refused with GIB_ERR_NULL or GIB_ERR_HANDLE because of the handle itself has nowhere to leave one.
  *
  * @param handle the instance.
  * @param text receives the sentence, UTF-8, with its NUL; empty when the last call did its work.

@@ -94,6 +94,8 @@ fn what_is_wrong_is_named_with_its_path() {
         (&|f| f["axes"][0]["name"] = json!("X1"), &["axes[0].name", "X1", "a to z"]),
         (&|f| f["axes"][0]["drive"] = json!("belt"), &["axes[0].drive", "belt", "ball_screw"]),
         (&|f| f["axes"][0]["lead_mm"] = json!(-5.0), &["axes[0].lead_mm", "-5", "above 0"]),
+        (&|f| f["axes"][0]["lead_mm"] = json!(1e12), &["axes[0].lead_mm: 1e12 is", "above 0, at most 1e9"]),
+        (&|f| f["axes"][0]["lead_mm"] = json!(1e-320), &["axes[0].lead_mm: 1e-320 is", "above 0"]),
         (&|f| f["axes"][0]["lead_mm"] = json!("ten"), &["axes[0].lead_mm", "a number", "a text"]),
         (&|f| f["axes"][0]["inertia_kg_m2"] = Value::Null, &["axes[0].inertia_kg_m2", "missing", "above 0"]),
         (&|f| f["axes"][0]["coulomb_friction_nm"] = json!(-0.1), &["axes[0].coulomb_friction_nm", "0 or more"]),
@@ -112,6 +114,10 @@ fn what_is_wrong_is_named_with_its_path() {
             &["axes[0].effects[1]", "backlash", "twice"],
         ),
         (
+            &|f| f["axes"][0]["effects"] = json!([{"cause": "stribeck_friction", "parameters": {"stribeck_torque_nm": -5, "stribeck_velocity_mm_s": 5}}]),
+            &["axes[0].effects[0].parameters.stribeck_torque_nm", "-5 takes", "0.9", "-0.9 or more"],
+        ),
+        (
             &|f| {
                 f["axes"][0]["effects"] =
                     json!([{"cause": "drive_compliance", "parameters": {"resonance_hz": 1, "stiffness_n_um": 100}}])
@@ -124,6 +130,9 @@ fn what_is_wrong_is_named_with_its_path() {
         assert!(words.iter().all(|word| error.contains(word)), "{words:?} in: {error}");
     }
     assert!(Machine::parse("{ \"schema\": ").unwrap_err().to_string().contains("line 1"));
+    let twice = rig("ball_screw").to_string().replacen("\"lead_mm\"", "\"lead_mm\":5,\"lead_mm\"", 1);
+    let why = Machine::parse(&twice).unwrap_err().to_string();
+    assert!(why.starts_with("axes[0].lead_mm is there twice"), "{why}");
 }
 
 #[test]
@@ -159,6 +168,8 @@ proptest! {
         }).collect();
         let effect = Effect::from_values(row.cause, &values).unwrap();
         let mut machine = Machine::parse(&rig(["ball_screw", "linear", "rotary"][drive]).to_string()).unwrap();
+        // More than any dip takes away.
+        machine.axes[0].base.coulomb = 50.0;
         machine.axes[0].effects.push(effect);
         let written = machine.to_json();
         prop_assert_eq!(schema::violations(&machine_schema(), &written), Vec::<String>::new());

@@ -1,15 +1,17 @@
 //! Family `diagnosis`: what a simulation gets wrong, why, and what knowing it is worth, as seen from C. Off the cycle.
 
 use super::guard::{CONFIG, Instance, guarded, instance, versioned};
+use super::last_error::{LastError, Refused};
 use super::machine::{GibMachine, file_status};
 use super::text::{copy_out, path_if_any, path_of, text_if_any};
 use crate::diagnosis::{Diagnosis, Excerpt, Verdict, axis_of, diagnose};
 use crate::error::{
-    Fault, GIB_DONE, GIB_ERR_ABORTED, GIB_ERR_DIAGNOSIS_AXIS, GIB_ERR_DIAGNOSIS_HOLDOUT, GIB_ERR_NULL, GIB_ERR_STATE,
-    GIB_ERR_STRUCT_SIZE, GIB_OK,
+    Fault, GIB_DONE, GIB_ERR_ABORTED, GIB_ERR_DIAGNOSIS_AXIS, GIB_ERR_DIAGNOSIS_HOLDOUT, GIB_ERR_FORMAT, GIB_ERR_NULL,
+    GIB_ERR_STATE, GIB_ERR_STRUCT_SIZE, GIB_OK,
 };
 use crate::machine::Machine;
-use crate::recording::Recording;
+use crate::plant::plausible::plausible;
+use crate::recording::{Recording, is_same_file};
 use core::ffi::{c_char, c_void};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -91,8 +93,7 @@ struct Work {
     diagnosis: Option<Diagnosis>,
     /// The machine with what was found.
     extended: Option<Machine>,
-    /// The sentence of the last error.
-    last: String,
+    last: LastError,
 }
 
 /// What was read by `start`.
@@ -128,24 +129,53 @@ impl GibDiagnosis {
     }
 }
 
+impl Work {
+    /// Does the work, if it is told to go on.
+    fn diagnosed(&mut self, go_on: &(dyn Fn(f64, &'static str) -> bool + Sync)) -> Result<i32, Refused> {
+        let not_started = || Refused(GIB_ERR_STATE, "gib_diagnosis_start has not succeeded yet".into());
+        let task = self.task.as_ref().ok_or_else(not_started)?;
+        let axis = task.machine.axes.get(task.axis).ok_or_else(not_started)?;
+        let diagnosis = diagnose(axis, &task.recording, task.holdout.as_ref(), go_on)
+            .map_err(|_| Refused(GIB_ERR_ABORTED, "stopped before a result was reached".into()))?;
+        let mut extended = task.machine.clone();
+        if let Some(axis) = extended.axes.get_mut(task.axis) {
+            *axis = diagnosis.extended.clone();
+        }
+        (self.diagnosis, self.extended) = (Some(diagnosis), Some(extended));
+        Ok(GIB_DONE)
+    }
+
+    /// What was found, and the machine with it.
+    fn found(&self) -> Result<(&Diagnosis, &Machine), Refused> {
+        let both = self.diagnosis.as_ref().zip(self.extended.as_ref());
+        both.ok_or_else(|| Refused(GIB_ERR_STATE, "no gib_diagnosis_run is done yet".into()))
+    }
+}
+
 impl Task {
     /// Reads what a configuration names.
-    fn read(
-        machine: &Machine,
-        recording: &Path,
-        holdout: Option<&Path>,
-        axis: Option<&str>,
-    ) -> Result<Task, (i32, String)> {
-        let open = |path: &Path| Recording::open(path).map_err(|why| (file_status(path), why.to_string()));
-        let recording = open(recording)?;
-        let number = axis_of(machine, &recording, axis).map_err(|why| (GIB_ERR_DIAGNOSIS_AXIS, why))?;
-        let axis = machine.axes.get(number).ok_or_else(|| (GIB_ERR_DIAGNOSIS_AXIS, String::new()))?;
+    fn read(machine: &Machine, recording: &Path, holdout: Option<&Path>, axis: Option<&str>) -> Result<Task, Refused> {
+        let open = |path: &Path| Recording::open(path).map_err(|why| Refused(file_status(path), why.to_string()));
+        if holdout.is_some_and(|holdout| is_same_file(holdout, recording)) {
+            let why = "the hold-out is the recording itself, on which a gain says nothing".to_owned();
+            return Err(Refused(GIB_ERR_DIAGNOSIS_HOLDOUT, why));
+        }
+        let mut recording = open(recording)?;
+        let number = axis_of(machine, &recording, axis).map_err(|why| Refused(GIB_ERR_DIAGNOSIS_AXIS, why))?;
+        let axis = machine.axes.get(number).ok_or(GIB_ERR_DIAGNOSIS_AXIS)?;
+        let check = |recording: &mut Recording| plausible(recording, axis).map_err(|why| Refused(GIB_ERR_FORMAT, why));
+        check(&mut recording)?;
         // One after the other, so that there is room for either.
         let excerpt = Excerpt::of(&recording, axis);
         drop(recording);
-        let holdout = holdout.map(|file| open(file).map(|read| Excerpt::of(&read, axis))).transpose()?;
+        let read = |file: &Path| -> Result<Excerpt, Refused> {
+            let mut recording = open(file)?;
+            check(&mut recording)?;
+            Ok(Excerpt::of(&recording, axis))
+        };
+        let holdout = holdout.map(read).transpose()?;
         if let Some(Err(why)) = holdout.as_ref().map(Excerpt::usable) {
-            return Err((GIB_ERR_DIAGNOSIS_HOLDOUT, why.to_string()));
+            return Err(Refused(GIB_ERR_DIAGNOSIS_HOLDOUT, why.to_string()));
         }
         Ok(Task { machine: machine.clone(), axis: number, recording: excerpt, holdout })
     }
@@ -199,29 +229,44 @@ pub unsafe extern "C" fn gib_diagnosis_start(handle: *mut GibDiagnosis, config: 
         *work = Work::default();
         handle.stop.store(false, Ordering::Relaxed);
         // SAFETY: the caller's promise.
-        let config = unsafe { versioned(CONFIG, config, size_of::<GibDiagnosisConfig>()) }.map_err(|fault| {
-            let Fault { code, value, high, .. } = fault;
-            if code == GIB_ERR_STRUCT_SIZE {
-                work.last = format!(
-                    "struct_size is {value}, not {high}: set it to sizeof, and zero the rest before you fill it"
-                );
-            }
-            code
-        })?;
-        // SAFETY: the caller's promise.
-        let machine = unsafe { instance(config.machine) }?.machine.as_ref().ok_or(GIB_ERR_STATE)?;
-        // SAFETY: the caller's promise, for the three of them.
-        let (recording, holdout, axis) =
-            unsafe { (path_of(config.recording)?, path_if_any(config.holdout), text_if_any(config.axis)?) };
-        match Task::read(machine, recording, holdout, axis) {
-            Ok(task) => work.task = Some(task),
-            Err((status, why)) => {
-                work.last = why;
-                return Err(status);
-            }
-        }
-        Ok(GIB_OK)
+        let started = unsafe { read_config(config) }.map(|task| {
+            work.task = Some(task);
+            GIB_OK
+        });
+        work.last.of(started)
     })
+}
+
+/// Reads what the caller's configuration names.
+///
+/// # Safety
+/// As [`gib_diagnosis_start`].
+unsafe fn read_config(config: *const GibDiagnosisConfig) -> Result<Task, Refused> {
+    // SAFETY: the caller's promise.
+    let config = unsafe { versioned(CONFIG, config, size_of::<GibDiagnosisConfig>()) }.map_err(|fault| {
+        let Fault { code, value, high, .. } = fault;
+        match code {
+            GIB_ERR_STRUCT_SIZE => Refused(
+                code,
+                format!("struct_size is {value}, not {high}: set it to sizeof, and zero the rest before you fill it"),
+            ),
+            GIB_ERR_NULL => Refused(code, "config is NULL".into()),
+            _ => code.into(),
+        }
+    })?;
+    // SAFETY: the caller's promise.
+    let machine = unsafe { instance(config.machine) }
+        .map_err(|status| Refused(status, "config.machine is NULL or no machine".into()))?;
+    let machine = machine
+        .machine
+        .as_ref()
+        .ok_or_else(|| Refused(GIB_ERR_STATE, "no machine was read into config.machine".into()))?;
+    // SAFETY: the caller's promise, for the three of them.
+    let (recording, holdout, axis) =
+        unsafe { (path_of(config.recording), path_if_any(config.holdout), text_if_any(config.axis)) };
+    let recording = recording.map_err(|status| Refused(status, "config.recording is NULL".into()))?;
+    let axis = axis.map_err(|status| Refused(status, "config.axis is not UTF-8; it is one letter, a to z".into()))?;
+    Task::read(machine, recording, holdout, axis)
 }
 
 /// Does the whole work, and returns when it is done or stopped: seconds for a minute of recording. It starts threads
@@ -248,20 +293,10 @@ pub unsafe extern "C" fn gib_diagnosis_run(
         // SAFETY: the caller's promise.
         let handle = unsafe { instance(handle) }?;
         let mut work = handle.work()?;
-        let Some(task) = &work.task else { return Err(GIB_ERR_STATE) };
-        let axis = task.machine.axes.get(task.axis).ok_or(GIB_ERR_STATE)?;
         let told = Told { progress, user };
         let go_on = |share: f64, stage: &'static str| !handle.stop.load(Ordering::Relaxed) && told.say(share, stage);
-        let Ok(diagnosis) = diagnose(axis, &task.recording, task.holdout.as_ref(), &go_on) else {
-            work.last = "stopped before a result was reached".into();
-            return Err(GIB_ERR_ABORTED);
-        };
-        let mut extended = task.machine.clone();
-        if let Some(axis) = extended.axes.get_mut(task.axis) {
-            *axis = diagnosis.extended.clone();
-        }
-        (work.diagnosis, work.extended) = (Some(diagnosis), Some(extended));
-        Ok(GIB_DONE)
+        let done = work.diagnosed(&go_on);
+        work.last.of(done)
     })
 }
 
@@ -321,22 +356,32 @@ pub unsafe extern "C" fn gib_diagnosis_abort(handle: *mut GibDiagnosis) -> i32 {
 pub unsafe extern "C" fn gib_diagnosis_result(handle: *const GibDiagnosis, report: *mut GibDiagnosisReport) -> i32 {
     guarded(|| {
         // SAFETY: the caller's promise.
-        let report = unsafe { report.as_mut() }.ok_or(GIB_ERR_NULL)?;
-        *report = GibDiagnosisReport::default();
+        let mut report = unsafe { report.as_mut() };
+        if let Some(report) = &mut report {
+            **report = GibDiagnosisReport::default();
+        }
         // SAFETY: the caller's promise.
         let work = unsafe { instance(handle) }?.work()?;
-        let diagnosis = work.diagnosis.as_ref().ok_or(GIB_ERR_STATE)?;
+        let report = report.ok_or_else(|| Refused(GIB_ERR_NULL, "report is NULL".into()));
+        work.last.of(report.and_then(|report| {
+            *report = GibDiagnosisReport::of(work.found()?.0);
+            Ok(GIB_OK)
+        }))
+    })
+}
+
+impl GibDiagnosisReport {
+    fn of(diagnosis: &Diagnosis) -> Self {
         let word = diagnosis.extended.drive.torque_word();
         let gain = diagnosis.gains.iter().find(|gain| gain.channel == word);
-        *report = GibDiagnosisReport {
+        Self {
             verdict: number(diagnosis.verdict),
             findings: diagnosis.findings.len() as u32,
             residual_before: gain.map_or(0.0, |gain| gain.before),
             residual_after: gain.map_or(0.0, |gain| gain.after),
             noise: diagnosis.unexplained.torque.noise_rms,
-        };
-        Ok(GIB_OK)
-    })
+        }
+    }
 }
 
 fn number(verdict: Verdict) -> i32 {
@@ -374,9 +419,10 @@ pub unsafe extern "C" fn gib_diagnosis_json(
     guarded(|| {
         // SAFETY: the caller's promise.
         let work = unsafe { instance(handle) }?.work()?;
-        let diagnosis = work.diagnosis.as_ref().ok_or(GIB_ERR_STATE)?;
+        let text = work.found().map(|(diagnosis, _)| format!("{:#}\n", diagnosis.to_json()));
         // SAFETY: the caller's promise.
-        unsafe { copy_out(&format!("{:#}\n", diagnosis.to_json()), json, size, needed) }
+        let copied = text.and_then(|text| unsafe { copy_out(&text, json, size, needed) }.map_err(Refused::from));
+        work.last.of(copied)
     })
 }
 
@@ -395,16 +441,21 @@ pub unsafe extern "C" fn gib_diagnosis_json(
 pub unsafe extern "C" fn gib_diagnosis_machine(handle: *const GibDiagnosis, machine: *mut GibMachine) -> i32 {
     guarded(|| {
         // SAFETY: the caller's promise.
-        let (work, machine) = unsafe { (instance(handle)?.work()?, super::guard::instance_mut(machine)?) };
-        machine.machine = Some(work.extended.clone().ok_or(GIB_ERR_STATE)?);
-        Ok(GIB_OK)
+        let (work, machine) = unsafe { (instance(handle)?.work()?, super::guard::instance_mut(machine)) };
+        let machine = machine.map_err(|status| Refused(status, "machine is NULL or no machine".into()));
+        work.last.of(machine.and_then(|machine| {
+            machine.machine = Some(work.found()?.1.clone());
+            Ok(GIB_OK)
+        }))
     })
 }
 
-/// Why the last call failed, as a sentence that names file, row and column, what was found and what is allowed.
+/// Why the last call failed, as a sentence that names file, row and column, what was found and what is allowed. Each
+/// call of this family on the handle but gib_diagnosis_abort forgets the sentence of the one before and leaves its own if
+/// it fails; a call that is refused because of the handle itself, or because another thread works, leaves none.
 ///
 /// @param handle the instance.
-/// @param text receives the sentence, UTF-8, with its NUL; empty when nothing went wrong.
+/// @param text receives the sentence, UTF-8, with its NUL; empty when the last call did its work.
 /// @param size bytes at `text`; a longer sentence is cut.
 /// @return GIB_OK; GIB_ERR_BUFFER when the sentence was cut; GIB_ERR_STATE while another thread works; GIB_ERR_NULL,
 /// GIB_ERR_HANDLE.
@@ -421,6 +472,6 @@ pub unsafe extern "C" fn gib_diagnosis_last_error_text(
 ) -> i32 {
     guarded(|| {
         // SAFETY: the caller's promise.
-        unsafe { copy_out(&instance(handle)?.work()?.last, text, size, core::ptr::null_mut()) }
+        unsafe { copy_out(&instance(handle)?.work()?.last.sentence(), text, size, core::ptr::null_mut()) }
     })
 }

@@ -1,6 +1,7 @@
 //! Family `machine`: what a simulation believes about a machine, as JSON, as seen from C.
 
 use super::guard::{Instance, guarded, instance, instance_mut};
+use super::last_error::{LastError, Refused};
 use super::text::{copy_out, path_of};
 use crate::error::{GIB_ERR_FORMAT, GIB_ERR_IO, GIB_ERR_NULL, GIB_ERR_STATE, GIB_OK};
 use crate::machine::Machine;
@@ -15,8 +16,7 @@ pub struct GibMachine {
     alive: u64,
     /// The machine that was read last.
     pub(super) machine: Option<Machine>,
-    /// The sentence of the last error.
-    last: String,
+    last: LastError,
 }
 
 impl Instance for GibMachine {
@@ -24,7 +24,7 @@ impl Instance for GibMachine {
         self.alive == ALIVE
     }
     fn new() -> GibMachine {
-        GibMachine { alive: ALIVE, machine: None, last: String::new() }
+        GibMachine { alive: ALIVE, machine: None, last: LastError::default() }
     }
     fn bury(&mut self) {
         self.alive = 0;
@@ -42,18 +42,17 @@ pub(super) fn file_status(file: &Path) -> i32 {
 
 impl GibMachine {
     /// Keeps the machine, or why there is none.
-    fn keep(&mut self, read: Result<Machine, String>, status: i32) -> i32 {
-        match read {
-            Ok(machine) => {
-                self.machine = Some(machine);
-                self.last.clear();
-                GIB_OK
-            }
-            Err(why) => {
-                self.last = why;
-                status
-            }
-        }
+    fn keep(&mut self, read: Result<Machine, Refused>) -> Result<i32, i32> {
+        let kept = read.map(|machine| {
+            self.machine = Some(machine);
+            GIB_OK
+        });
+        self.last.of(kept)
+    }
+
+    /// The machine that was read.
+    fn read(&self) -> Result<&Machine, Refused> {
+        self.machine.as_ref().ok_or_else(|| Refused(GIB_ERR_STATE, "no machine was read into this handle".into()))
     }
 }
 
@@ -99,13 +98,13 @@ pub unsafe extern "C" fn gib_machine_read(handle: *mut GibMachine, json: *const 
         // SAFETY: the caller's promise.
         let handle = unsafe { instance_mut(handle) }?;
         if json.is_null() || length > isize::MAX as usize {
-            return Err(GIB_ERR_NULL);
+            return handle.keep(Err(GIB_ERR_NULL.into()));
         }
         // SAFETY: not NULL, `length` readable bytes by the caller's promise.
         let bytes = unsafe { core::slice::from_raw_parts(json.cast::<u8>(), length) };
         let text = core::str::from_utf8(bytes).map_err(|why| format!("not UTF-8: {why}"));
         let read = text.and_then(|text| Machine::parse(text).map_err(|why| why.to_string()));
-        Ok(handle.keep(read, GIB_ERR_FORMAT))
+        handle.keep(read.map_err(|why| Refused(GIB_ERR_FORMAT, why)))
     })
 }
 
@@ -124,8 +123,9 @@ pub unsafe extern "C" fn gib_machine_read(handle: *mut GibMachine, json: *const 
 pub unsafe extern "C" fn gib_machine_load(handle: *mut GibMachine, path: *const c_char) -> i32 {
     guarded(|| {
         // SAFETY: the caller's promise.
-        let (handle, path) = unsafe { (instance_mut(handle)?, path_of(path)?) };
-        Ok(handle.keep(Machine::load(path).map_err(|why| why.to_string()), file_status(path)))
+        let (handle, path) = unsafe { (instance_mut(handle)?, path_of(path)) };
+        let load = |path| Machine::load(path).map_err(|why| Refused(file_status(path), why.to_string()));
+        handle.keep(path.map_err(Refused::from).and_then(load))
     })
 }
 
@@ -143,15 +143,12 @@ pub unsafe extern "C" fn gib_machine_load(handle: *mut GibMachine, path: *const 
 pub unsafe extern "C" fn gib_machine_save(handle: *mut GibMachine, path: *const c_char) -> i32 {
     guarded(|| {
         // SAFETY: the caller's promise.
-        let (handle, path) = unsafe { (instance_mut(handle)?, path_of(path)?) };
-        let machine = handle.machine.as_ref().ok_or(GIB_ERR_STATE)?;
-        match machine.save(path) {
-            Ok(()) => Ok(GIB_OK),
-            Err(why) => {
-                handle.last = why.to_string();
-                Err(GIB_ERR_IO)
-            }
-        }
+        let (handle, path) = unsafe { (instance_mut(handle)?, path_of(path)) };
+        let save = |path| {
+            let saved = handle.read()?.save(path);
+            saved.map(|()| GIB_OK).map_err(|why| Refused(GIB_ERR_IO, why.to_string()))
+        };
+        handle.last.of(path.map_err(Refused::from).and_then(save))
     })
 }
 
@@ -180,9 +177,10 @@ pub unsafe extern "C" fn gib_machine_result(
     guarded(|| {
         // SAFETY: the caller's promise.
         let handle = unsafe { instance(handle) }?;
-        let machine = handle.machine.as_ref().ok_or(GIB_ERR_STATE)?;
+        let text = handle.read().map(|machine| format!("{:#}\n", machine.to_json()));
         // SAFETY: the caller's promise.
-        unsafe { copy_out(&format!("{:#}\n", machine.to_json()), json, size, needed) }
+        let copied = text.and_then(|text| unsafe { copy_out(&text, json, size, needed) }.map_err(Refused::from));
+        handle.last.of(copied)
     })
 }
 
@@ -208,14 +206,16 @@ pub unsafe extern "C" fn gib_machine_ignored_keys(
     guarded(|| {
         // SAFETY: the caller's promise.
         let handle = unsafe { instance(handle) }?;
-        let machine = handle.machine.as_ref().ok_or(GIB_ERR_STATE)?;
+        let keys = handle.read().map(|machine| machine.ignored_keys.join("\n"));
         // SAFETY: the caller's promise.
-        unsafe { copy_out(&machine.ignored_keys.join("\n"), text, size, needed) }
+        let copied = keys.and_then(|keys| unsafe { copy_out(&keys, text, size, needed) }.map_err(Refused::from));
+        handle.last.of(copied)
     })
 }
 
 /// Why the last call failed, as a sentence that names the file or the path in the JSON, what was found and what is
-/// allowed.
+/// allowed. Each call of this family on the handle forgets the sentence of the one before and leaves its own if it
+/// fails; a call that is refused with GIB_ERR_NULL or GIB_ERR_HANDLE because of the handle itself has nowhere to leave one.
 ///
 /// @param handle the instance.
 /// @param text receives the sentence, UTF-8, with its NUL; empty when the last call did its work.
@@ -230,6 +230,6 @@ pub unsafe extern "C" fn gib_machine_ignored_keys(
 pub unsafe extern "C" fn gib_machine_last_error_text(handle: *const GibMachine, text: *mut c_char, size: usize) -> i32 {
     guarded(|| {
         // SAFETY: the caller's promise.
-        unsafe { copy_out(&instance(handle)?.last, text, size, core::ptr::null_mut()) }
+        unsafe { copy_out(&instance(handle)?.last.sentence(), text, size, core::ptr::null_mut()) }
     })
 }

@@ -13,6 +13,7 @@ pub mod entry;
 pub mod guard;
 pub mod homing;
 pub mod inertia;
+pub mod last_error;
 pub mod learning;
 pub mod machine;
 pub mod program;

@@ -1,16 +1,18 @@
 //! `gib diagnose`: what the simulation gets wrong, why, and what knowing it is worth.
 
-use std::fmt::Write;
-use std::io::IsTerminal;
+use std::error::Error;
+use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, Instant};
 
 use clap::Args;
 use gib::diagnosis::gain::Gain;
 use gib::diagnosis::{Diagnosis, Excerpt, Left, Verdict, axis_of, diagnose};
-use gib::recording::Recording;
+use gib::plant::plausible::plausible;
+use gib::recording::{Recording, is_same_file};
 
+use super::meter::Meter;
+use super::outputs::Outputs;
 use super::table::Table;
 use super::{Answer, Result, machine_file};
 
@@ -51,38 +53,56 @@ pub struct Diagnose {
 impl Diagnose {
     /// Diagnoses the recording.
     pub fn run(&self) -> Result {
+        let holdout = self.holdout.as_deref();
+        let inputs =
+            [("--machine", Some(&*self.machine)), ("--recording", Some(&*self.recording)), ("--holdout", holdout)];
+        let mut outputs = Outputs::beside(&inputs);
+        if let Some(file) = holdout.filter(|file| is_same_file(file, &self.recording)) {
+            let file = file.display();
+            return Err(format!(
+                "--holdout {file}: is the recording itself, on which a gain says nothing; leave it out"
+            )
+            .into());
+        }
+        outputs.add("--json", self.json.as_deref())?;
+        outputs.add("--machine-out", self.machine_out.as_deref())?;
         let mut machine = machine_file::load(&self.machine)?;
-        let recording = Recording::open(&self.recording)?;
+        let mut recording = Recording::open(&self.recording)?;
         let chosen = axis_of(&machine, &recording, self.axis.as_deref())?;
         let axis = &mut machine.axes[chosen];
+        if let Some(folder) = &self.plot {
+            std::fs::create_dir_all(folder).map_err(|e| format!("--plot {}: {e}", folder.display()))?;
+            outputs.add("--plot", Some(&folder.join(format!("residual_{}.svg", axis.name))))?;
+        }
+        plausible(&mut recording, axis)?;
         // One after the other, so that there is room for either.
         let excerpt = Excerpt::of(&recording, axis);
         drop(recording);
-        let holdout = self.holdout.as_deref().map(|file| Recording::open(file).map(|read| Excerpt::of(&read, axis)));
-        let holdout = holdout.transpose()?;
+        let read = |file| -> std::result::Result<Excerpt, Box<dyn Error>> {
+            let mut recording = Recording::open(file)?;
+            plausible(&mut recording, axis)?;
+            Ok(Excerpt::of(&recording, axis))
+        };
+        let holdout = holdout.map(read).transpose()?;
         if let Some(Err(why)) = holdout.as_ref().map(Excerpt::usable) {
             return Err(why.clone().into());
         }
         let meter = Meter::new(self.progress);
-        let Ok(diagnosis) = diagnose(axis, &excerpt, holdout.as_ref(), &|share, stage| meter.show(share, stage)) else {
+        let Ok(diagnosis) = diagnose(axis, &excerpt, holdout.as_ref(), &|share, stage| {
+            meter.show(share, stage);
+            true
+        }) else {
             return Err("stopped".into());
         };
-        meter.clear();
-        if let Some(file) = &self.json {
-            std::fs::write(file, format!("{:#}\n", diagnosis.to_json()))
-                .map_err(|e| format!("{}: {e}", file.display()))?;
-        }
-        if let Some(folder) = &self.plot {
+        drop(meter);
+        outputs.write("--json", |out| writeln!(out, "{:#}", diagnosis.to_json()))?;
+        if self.plot.is_some() {
             let picture = gib::report::residual::picture(&diagnosis)?;
-            let file = folder.join(format!("residual_{}.svg", axis.name));
-            std::fs::create_dir_all(folder)
-                .and_then(|()| std::fs::write(&file, picture))
-                .map_err(|e| format!("{}: {e}", file.display()))?;
+            outputs.write("--plot", |out| out.write_all(picture.as_bytes()))?;
         }
         *axis = diagnosis.extended.clone();
-        if let Some(file) = &self.machine_out {
-            machine.save(file)?;
-        }
+        outputs.write("--machine-out", |out| writeln!(out, "{:#}", machine.to_json()))?;
+        outputs.commit()?;
         let good = !matches!(diagnosis.verdict, Verdict::UnknownCause | Verdict::InsufficientData);
         Ok(Answer { text: text(&diagnosis), good })
     }
@@ -206,40 +226,4 @@ const MOST_TIMES: f64 = 1000.0;
 fn beside(value: f64, neighbour: f64) -> String {
     let places = decimals(value, 3).max(decimals(neighbour, 3));
     format!("{value:.places$}")
-}
-
-/// Says how far the work is, where it was asked for, or where someone sits at a terminal and it takes more than a second.
-struct Meter {
-    always: bool,
-    terminal: bool,
-    begin: Instant,
-    /// Percent shown last.
-    shown: AtomicU32,
-}
-
-impl Meter {
-    fn new(always: bool) -> Self {
-        let terminal = std::io::stderr().is_terminal();
-        Self { always, terminal, begin: Instant::now(), shown: AtomicU32::new(u32::MAX) }
-    }
-
-    fn show(&self, share: f64, stage: &str) -> bool {
-        let percent = (100.0 * share) as u32;
-        let due = self.always || self.terminal && self.begin.elapsed() > Duration::from_secs(1);
-        if due && self.shown.swap(percent, Ordering::Relaxed) != percent {
-            if self.terminal {
-                eprint!("\r\x1b[K{percent:3} % {stage}");
-            } else {
-                eprintln!("{percent:3} % {stage}");
-            }
-        }
-        true
-    }
-
-    /// Leaves a clean line.
-    fn clear(&self) {
-        if self.terminal && self.shown.load(Ordering::Relaxed) != u32::MAX {
-            eprint!("\r\x1b[K");
-        }
-    }
 }

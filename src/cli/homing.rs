@@ -8,6 +8,7 @@ use gib::recording::Recording;
 use gib::report::homing::picture;
 use serde_json::json;
 
+use super::outputs::Outputs;
 use super::table::Table;
 use super::{Answer, Result};
 
@@ -54,14 +55,15 @@ impl HomingCommand {
         if let Some(limit) = self.limit.filter(|limit| !(*limit > 0.0 && limit.is_finite())) {
             return Err(format!("--limit is {limit}; expected a number above 0").into());
         }
+        let mut outputs = Outputs::beside(&[("<RECORDING>", Some(&*self.recording))]);
+        outputs.add("--plot", self.plot.as_deref())?;
         let recording = Recording::open(&self.recording)?;
         let channel = super::axis(&recording, self.axis.as_deref())?;
         let options = Options { channel, direction: self.direction, limit: self.limit };
         let found = contacts(&recording, &options)
             .map_err(|why| format!("{}: axis {}: {why}", recording.file, options.channel))?;
-        if let Some(path) = &self.plot {
-            std::fs::write(path, picture(&found)?)
-                .map_err(|why| format!("{}: cannot be written: {why}", path.display()))?;
+        if self.plot.is_some() {
+            outputs.picture("--plot", &picture(&found)?)?;
         }
         let text = if self.json { as_json(&found)? } else { text(&recording.file, &found) };
         Ok(Answer { text, good: found.touches.iter().all(|touch| touch.contact.is_ok()) })

@@ -10,6 +10,7 @@ use gib::program::{self, Scope};
 use gib::recording::Recording;
 use serde_json::json;
 
+use super::outputs::Outputs;
 use super::{Answer, Result};
 
 /// Measures inertia and friction of a spindle from its torque and speed while it speeds up and slows down
@@ -68,6 +69,9 @@ pub struct InertiaCommand {
 impl InertiaCommand {
     /// Measures and tells.
     pub fn run(&self) -> Result {
+        let mut outputs =
+            Outputs::beside(&[("<RECORDING>", Some(&*self.recording)), ("--program", self.program.as_deref())]);
+        outputs.add("--plot", self.plot.as_deref())?;
         if let Some(file) = &self.program
             && let Some(entry) = program::get(file, self.step)?
         {
@@ -78,8 +82,7 @@ impl InertiaCommand {
         let found = measure(&Recording::open(&self.recording)?, &self.options())?;
         let mut text = if self.json { as_json(&found)? } else { self.text(&found) };
         if let (Some(path), false) = (&self.plot, found.blocks.is_empty()) {
-            let picture = gib::report::inertia::picture(&found)?;
-            std::fs::write(path, picture).map_err(|why| format!("{}: cannot be written: {why}", path.display()))?;
+            outputs.picture("--plot", &gib::report::inertia::picture(&found)?)?;
             if !self.json {
                 let _ = writeln!(text, "\nPicture: {}", path.display());
             }

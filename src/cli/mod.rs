@@ -9,6 +9,8 @@ mod inertia;
 mod inspect;
 mod lost_motion;
 mod machine_file;
+mod meter;
+mod outputs;
 mod predict;
 mod program;
 mod record;

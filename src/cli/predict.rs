@@ -1,9 +1,8 @@
 //! `gib predict`: what a machine file says a recording should look like, row by row.
 
 use std::fmt::Write as _;
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::io::{self, Write};
+use std::path::PathBuf;
 
 use clap::Args;
 use gib::machine::Axis;
@@ -11,17 +10,20 @@ use gib::plant::added::Pulses;
 use gib::plant::closed_loop::predict_motor;
 use gib::plant::linear;
 use gib::plant::observed::Observed;
+use gib::plant::plausible::plausible;
 use gib::plant::servo::CommandSpeed;
-use gib::recording::{Column, Recording, Signal};
+use gib::recording::{Column, Issue, IssueKind, Recording, Signal};
 use serde_json::{Map, Value, json};
 
+use super::meter::Clock;
+use super::outputs::Outputs;
 use super::{Answer, Result, machine_file};
 
 /// Predicts the torque and, with a servo block, the closed-loop position of a recording
 ///
 /// Writes time_s, then for each axis that machine and recording share: measured, predicted and residual torque (force for
-/// linear drives), measured and simulated position. Over a few lost rows the motion goes on; rows in which it is not known stay
-/// empty.
+/// linear drives), measured and simulated position. Over a few lost rows the motion goes on; rows in which it is not known, or that
+/// repeat the time of the one before, stay empty.
 #[derive(Args)]
 pub struct Predict {
     /// The machine file, with or without effects
@@ -38,9 +40,16 @@ pub struct Predict {
     json: bool,
 }
 
+/// Of what is amiss with a recording, what a reader of its prediction must know.
+const LEFT_OUT: [IssueKind; 3] = [IssueKind::NotFinite, IssueKind::Outlier, IssueKind::Implausible];
+
 impl Predict {
     /// Predicts and writes.
     pub fn run(&self) -> Result {
+        let inputs = [("--machine", Some(&*self.machine)), ("--recording", Some(&*self.recording))];
+        let mut outputs = Outputs::beside(&inputs);
+        outputs.add("--out", Some(&self.out))?;
+        let clock = Clock::new("reading");
         let machine = machine_file::load(&self.machine)?;
         let mut recording = Recording::open(&self.recording)?;
         let shared: Vec<&Axis> =
@@ -50,18 +59,38 @@ impl Predict {
             let file = self.recording.display();
             return Err(format!("{file}: no position column of an axis of the machine ({})", names.join(", ")).into());
         }
+        shared.iter().try_for_each(|axis| plausible(&mut recording, axis))?;
         // Long recordings have no room for what is not used.
         recording.columns.retain(|column| shared.iter().any(|axis| is_used(column, axis)));
-        let axes: Vec<Predicted> =
-            shared.iter().map(|axis| Predicted::of(axis, &mut recording)).collect::<std::result::Result<_, _>>()?;
-        write(&self.out, &recording.time_s, &axes)?;
+        let axes: Vec<Predicted> = shared
+            .iter()
+            .map(|axis| {
+                clock.stage(format!("predicting axis {}", axis.name));
+                Predicted::of(axis, &mut recording)
+            })
+            .collect::<std::result::Result<_, _>>()?;
+        clock.stage("writing");
+        outputs.write("--out", |out| write_rows(out, &recording, &axes))?;
+        outputs.commit()?;
+        drop(clock);
         if self.json {
             let figures: Map<String, Value> = axes.iter().map(|p| (p.axis.name.clone(), p.figures().json())).collect();
             return Ok(Answer::good(format!("{:#}\n", Value::Object(figures))));
         }
         let mut text = String::new();
         axes.iter().for_each(|predicted| predicted.figures().text(predicted, &mut text));
-        let _ = writeln!(text, "{} rows written to {}", recording.rows(), self.out.display());
+        let concerns = |column: &str| shared.iter().any(|axis| column.split('.').next() == Some(&axis.name));
+        let left_out = |issue: &&Issue| LEFT_OUT.contains(&issue.kind) && issue.column.as_deref().is_some_and(concerns);
+        for issue in recording.issues.iter().filter(left_out) {
+            let _ = writeln!(text, "{issue}");
+        }
+        let repeats = recording.repeats.len();
+        let rows = recording.rows() + repeats;
+        if repeats > 0 {
+            let _ =
+                writeln!(text, "{repeats} rows repeat the time of the one before; all but their time is left empty");
+        }
+        let _ = writeln!(text, "{rows} rows written to {}", self.out.display());
         Ok(Answer::good(text))
     }
 }
@@ -204,13 +233,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
     linear::rms(values.filter(|v| v.is_finite()))
 }
 
-fn write(file: &Path, time_s: &[f64], axes: &[Predicted<'_>]) -> io::Result<()> {
-    let named = |e: io::Error| io::Error::new(e.kind(), format!("{}: {e}", file.display()));
-    let mut out = BufWriter::new(File::create(file).map_err(named)?);
-    write_rows(&mut out, time_s, axes).and_then(|()| out.flush()).map_err(named)
-}
-
-fn write_rows(out: &mut impl Write, time_s: &[f64], axes: &[Predicted<'_>]) -> io::Result<()> {
+fn write_rows(out: &mut impl Write, recording: &Recording, axes: &[Predicted<'_>]) -> io::Result<()> {
     write!(out, "time_s")?;
     for predicted in axes {
         let (name, drive) = (&predicted.axis.name, predicted.axis.drive);
@@ -225,7 +248,9 @@ fn write_rows(out: &mut impl Write, time_s: &[f64], axes: &[Predicted<'_>]) -> i
     }
     writeln!(out)?;
     let mut rows: Vec<_> = axes.iter().map(Predicted::rows).collect();
-    for time in time_s {
+    let cells: usize = axes.iter().map(|predicted| 4 + usize::from(predicted.position.is_some())).sum();
+    let mut repeats = recording.repeats.iter().peekable();
+    for (at, time) in recording.time_s.iter().enumerate() {
         write!(out, "{time}")?;
         for (predicted, rows) in axes.iter().zip(&mut rows) {
             let Some(row) = rows.next() else { continue };
@@ -239,6 +264,10 @@ fn write_rows(out: &mut impl Write, time_s: &[f64], axes: &[Predicted<'_>]) -> i
             }
         }
         writeln!(out)?;
+        // As many rows as were read, so that the two files can be laid side by side.
+        while repeats.next_if(|row| **row == at).is_some() {
+            writeln!(out, "{time}{}", ",".repeat(cells))?;
+        }
     }
     Ok(())
 }

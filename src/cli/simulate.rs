@@ -1,15 +1,16 @@
 //! `gib simulate`: an axis along a motion, as a recording.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use gib::machine::Axis;
 use gib::plant::moves::{BUILT_IN, Moves, Reach};
-use gib::plant::simulate::{Sensors, Setup, Trace, simulate};
+use gib::plant::simulate::{Sensors, Setup, Trace, simulate_watched};
 use gib::recording::{Recording, Signal, Unit};
 
+use super::meter::{Clock, Meter};
+use super::outputs::Outputs;
 use super::{Answer, Result, machine_file};
 
 /// Some five hours at 4 kHz, and 4 GB.
@@ -79,6 +80,9 @@ pub struct Simulate {
 impl Simulate {
     /// Simulates and writes.
     pub fn run(&self) -> Result {
+        let moves = Some(Path::new(&self.moves)).filter(|file| file.extension().is_some());
+        let mut outputs = Outputs::beside(&[("--machine", Some(&*self.machine)), ("--moves", moves)]);
+        outputs.add("--out", Some(&self.out))?;
         let machine = machine_file::load(&self.machine)?;
         let axis = match &self.axis {
             None => machine.axes.first(),
@@ -103,8 +107,13 @@ impl Simulate {
             },
             ..Setup::default()
         };
-        let trace = simulate(axis, &command, &setup)?;
-        write(&self.out, axis, &trace)?;
+        let meter = Meter::new(false);
+        let trace = simulate_watched(axis, &command, &setup, &mut |share| meter.show(share, "simulating"))?;
+        drop(meter);
+        let clock = Clock::new("writing");
+        outputs.write("--out", |out| write_rows(out, axis, &trace))?;
+        outputs.commit()?;
+        drop(clock);
         let seconds = trace.time_s.last().copied().unwrap_or(0.0);
         Ok(Answer::good(format!("{} rows over {seconds:.3} s written to {}\n", command.len(), self.out.display())))
     }
@@ -150,10 +159,19 @@ impl Simulate {
         let half_torque = 0.5 * belief.torque_limit / (belief.inertia * axis.drive.motor_per_load());
         let acceleration = self.acceleration_mm_s2.unwrap_or(half_torque.min(2000.0));
         let reach = Reach { start: self.start_mm, stroke: self.stroke_mm, speed: self.speed_mm_s, acceleration };
-        let fine = |value: f64, most: f64| value > 0.0 && value <= most;
-        if !(self.start_mm.abs() <= 1e6 && fine(reach.stroke, 1e6) && fine(reach.speed, 1e6) && fine(acceleration, 1e9))
-        {
-            return Err("stroke, speed and acceleration must be above 0 and of a machine's size".into());
+        let unit = axis.drive.load_unit();
+        for (option, value, low, high, unit) in [
+            ("--start-mm", reach.start, -1e6, 1e6, unit.to_owned()),
+            ("--stroke-mm", reach.stroke, 1e-6, 1e6, unit.to_owned()),
+            ("--speed-mm-s", reach.speed, 1e-6, 1e6, format!("{unit}/s")),
+            ("--acceleration-mm-s2", reach.acceleration, 1e-6, 1e9, format!("{unit}/s²")),
+        ] {
+            if !(value >= low && value <= high) {
+                let left_out = option == "--acceleration-mm-s2" && self.acceleration_mm_s2.is_none();
+                let why = if left_out { ", which half the torque limit gives; give it" } else { "" };
+                let value = if value == 0.0 { "0".to_owned() } else { format!("{value:e}") };
+                return Err(format!("{option} is {value} {unit}{why}; write a number from {low:e} to {high:e}"));
+            }
         }
         Ok(reach)
     }
@@ -167,12 +185,6 @@ fn trajectory(file: &Path, axis: &Axis, period_s: f64) -> std::result::Result<Ve
     let seconds = recording.time_s[recording.rows() - 1] - recording.time_s[0];
     let cycles = (seconds / period_s + 1e-6) as usize + 1;
     Ok(gib::plant::at_rows::command_of_cycles(&recording.time_s, &command, period_s, cycles).collect())
-}
-
-fn write(file: &Path, axis: &Axis, trace: &Trace) -> io::Result<()> {
-    let named = |e: io::Error| io::Error::new(e.kind(), format!("{}: {e}", file.display()));
-    let mut out = BufWriter::new(File::create(file).map_err(named)?);
-    write_rows(&mut out, axis, trace).and_then(|()| out.flush()).map_err(named)
 }
 
 fn write_rows(out: &mut impl Write, axis: &Axis, trace: &Trace) -> io::Result<()> {

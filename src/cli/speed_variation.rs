@@ -11,6 +11,7 @@ use gib::program::{self, Scope};
 use gib::report::speed_variation::{picture, points};
 use serde_json::json;
 
+use super::outputs::Outputs;
 use super::table::Table;
 use super::{Answer, Result};
 
@@ -72,6 +73,8 @@ const PERIODS: [f64; 8] = [0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0];
 impl SpeedVariationCommand {
     /// Computes and tells.
     pub fn run(&self) -> Result {
+        let mut outputs = Outputs::beside(&[("--program", self.program.as_deref())]);
+        outputs.add("--plot", self.plot.as_deref())?;
         let inertia = self.inertia()?;
         let plan = Plan::new(&SpeedVariationConfig {
             waveform: i32::from(self.sine),
@@ -93,9 +96,8 @@ impl SpeedVariationCommand {
         })?;
         let motor = plan.motor_cutting(plan.cutting);
         let recommended = motor.recommended(plan.wave, plan.mean, plan.chatter_hz);
-        if let Some(path) = &self.plot {
-            std::fs::write(path, picture(&motor, plan.wave, plan.mean, recommended)?)
-                .map_err(|why| format!("{}: cannot be written: {why}", path.display()))?;
+        if self.plot.is_some() {
+            outputs.picture("--plot", &picture(&motor, plan.wave, plan.mean, recommended)?)?;
         }
         let points = points(&motor, plan.wave, plan.mean, &PERIODS);
         let possible = recommended.0 > 0.0;

@@ -14,6 +14,7 @@ use gib::machine::load_table;
 use gib::recording::Recording;
 use serde_json::json;
 
+use super::outputs::Outputs;
 use super::table::Table;
 use super::{Answer, Result};
 
@@ -104,6 +105,8 @@ fn cut(text: &str) -> std::result::Result<(f64, PathBuf), String> {
 
 impl Teach {
     fn run(&self) -> Result {
+        let cuts: Vec<_> = self.cuts.iter().map(|(_, file)| ("<CUTS>", Some(&**file))).collect();
+        Outputs::beside(&cuts).add("<TABLE>", Some(&self.table))?;
         let mut table = if self.add { load_table::load(&self.table)? } else { TiltTable::default() };
         if let (Some(speed_rpm), Some(feed_mm_min)) = (self.speed, self.feed) {
             table.condition = TiltCondition { tool_id: self.tool, material_id: self.material, speed_rpm, feed_mm_min };

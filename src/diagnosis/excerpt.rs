@@ -59,6 +59,7 @@ fn amiss<'r>(recording: &'r Recording, axis: &'r Axis) -> impl Iterator<Item = S
             IssueKind::IrregularSampling => "rows are taken as even where the motion is smoother so, else interpolated to even steps; record one a servo cycle",
             IssueKind::NotFinite => "the rows around them are judged; record again if they are many",
             IssueKind::Jump | IssueKind::Outlier => "look at encoder and cable if it happens again",
+            IssueKind::Implausible => "look at how the column comes into the file if it happens again",
             IssueKind::Wrap => "nothing need be done",
             IssueKind::WrongUnit | IssueKind::UnknownColumn => return None,
         };

@@ -9,6 +9,7 @@
 
 pub mod calibration;
 mod cause;
+mod json;
 pub mod learning;
 pub mod load_table;
 mod read;

@@ -52,8 +52,10 @@ impl Machine {
     /// # Errors
     /// The text is not JSON (with line and column), or says something that is not allowed (with the JSON path).
     pub fn parse(text: &str) -> Result<Machine, Error> {
-        let value: Value = serde_json::from_str(text.trim_start_matches('\u{feff}'))
-            .map_err(|e| Error::at("", format!("not JSON: {e}")))?;
+        let value = super::json::parse(text).map_err(|e| {
+            let what = if e.is_data() { "" } else { "not JSON: " };
+            Error::at("", format!("{what}{e}"))
+        })?;
         let mut ignored_keys = Vec::new();
         let mut root = Object::new(&value, String::new(), &mut ignored_keys)?;
         match root.text("schema")? {
@@ -129,7 +131,31 @@ fn read_axis(mut object: Object<'_, '_>) -> Result<Axis, Error> {
     object.finish();
     let axis = Axis { name, drive, motor_pole_pairs: motor_pole_pairs.map(|n| n as u32), base, servo, effects };
     axis.two_masses().map_err(|message| Error::at(format!("{path}.effects"), message))?;
+    dip(&axis, &path)?;
     Ok(axis)
+}
+
+/// Share of a dip by which it may go beyond the friction that it is taken from: as much as a measurement may be off.
+const MEASURED: f64 = 0.1;
+
+/// A dip of friction at low speed takes away what there is, and no more: friction does not drive.
+fn dip(axis: &Axis, path: &str) -> Result<(), Error> {
+    let coulomb = axis.belief().coulomb;
+    for (i, effect) in axis.effects.iter().enumerate() {
+        let Effect::StribeckFriction { torque, .. } = *effect else { continue };
+        if coulomb + torque < MEASURED * torque {
+            let linear = axis.drive.is_linear();
+            let key = effect.cause().row().parameters.first().map_or("", |parameter| parameter.key_for(linear));
+            let message = format!(
+                "{} takes more than the Coulomb friction of {} away, so that friction would drive the axis; write {} or more",
+                shown(torque),
+                shown(coulomb),
+                shown(-coulomb)
+            );
+            return Err(Error::at(format!("{path}.effects[{i}].parameters.{key}"), message));
+        }
+    }
+    Ok(())
 }
 
 fn read_servo(mut object: Object<'_, '_>, linear: bool) -> Result<Servo, Error> {
@@ -259,7 +285,7 @@ impl<'v, 'i> Object<'v, 'i> {
         if number >= low && number <= high {
             return Ok(Some(number));
         }
-        Err(Error::at(self.path_of(key), format!("{number} is out of range; {}", allowed(low, high))))
+        Err(Error::at(self.path_of(key), format!("{} is out of range; {}", shown(number), allowed(low, high))))
     }
 
     fn required(&mut self, key: &'static str, low: f64, high: f64) -> Result<f64, Error> {
@@ -279,12 +305,16 @@ impl<'v, 'i> Object<'v, 'i> {
 }
 
 fn allowed(low: f64, high: f64) -> String {
-    match (low == TINY, high == HUGE) {
-        (true, true) => "write a number above 0".into(),
-        (false, true) if low == 0.0 => "write a number of 0 or more".into(),
-        (false, true) if low == -HUGE => "write a number".into(),
-        _ => format!("write a number from {low} to {high}"),
+    match low {
+        TINY => format!("write a number above 0, at most {}", shown(high)),
+        0.0 => format!("write a number of 0 or more, at most {}", shown(high)),
+        _ => format!("write a number from {} to {}", shown(low), shown(high)),
     }
+}
+
+/// A number of any size in a few digits.
+fn shown(number: f64) -> String {
+    if number == 0.0 || (1e-7..1e9).contains(&number.abs()) { number.to_string() } else { format!("{number:e}") }
 }
 
 fn kind(value: &Value) -> &'static str {

@@ -19,6 +19,7 @@ pub mod noise;
 pub mod observed;
 mod pace;
 pub mod physics;
+pub mod plausible;
 mod power;
 pub mod predict;
 pub mod servo;

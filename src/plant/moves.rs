@@ -7,6 +7,7 @@
 //! {"sweep_mm": 1, "from_hz": 1, "to_hz": 20, "duration_s": 10}]}`; on a rotary axis read mm as degrees.
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::f64::consts::{PI, TAU};
 
 /// One element of a motion. Load units.
@@ -44,16 +45,14 @@ pub enum Move {
 }
 
 /// A motion: where it starts and what is done from there.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Moves {
     /// `gib.moves/1`.
     pub schema: String,
     /// The axis it is meant for, where said.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<String>,
     /// Where the axis stands before the first move.
-    #[serde(default)]
     pub start_mm: f64,
     /// What is done, in order.
     pub moves: Vec<Move>,
@@ -61,6 +60,11 @@ pub struct Moves {
 
 /// Name of the format.
 pub const SCHEMA: &str = "gib.moves/1";
+/// What a list of moves looks like, for who wrote another.
+const FORM: &str =
+    "a list of moves is {\"schema\": \"gib.moves/1\", \"start_mm\": 0, \"moves\": [{…}, …]}, see docs/diagnosis.md";
+/// What a move looks like.
+const MOVES: &str = "{to_mm, speed_mm_s, acceleration_mm_s2, perhaps jerk_mm_s3}, {dwell_s} and {sweep_mm, from_hz, to_hz, duration_s}, each a number; see docs/diagnosis.md";
 /// Names of the built-in sets.
 pub const BUILT_IN: [&str; 4] = ["test", "reversals", "strokes", "sweep"];
 
@@ -83,14 +87,35 @@ impl Moves {
     /// # Errors
     /// Not JSON, another schema, or a value out of range, with the number of the move.
     pub fn parse(text: &str) -> Result<Moves, String> {
-        let moves: Moves = serde_json::from_str(text).map_err(|e| {
-            format!("{e}; a move is {{to_mm, speed_mm_s, acceleration_mm_s2}}, {{dwell_s}} or {{sweep_mm, from_hz, to_hz, duration_s}}")
-        })?;
-        if moves.schema != SCHEMA {
-            return Err(format!("schema \"{}\" is not known; this gib reads \"{SCHEMA}\"", moves.schema));
+        let value: Value =
+            serde_json::from_str(text.trim_start_matches('\u{feff}')).map_err(|e| format!("not JSON: {e}; {FORM}"))?;
+        let Value::Object(mut object) = value else { return Err(format!("is no object {{…}}; {FORM}")) };
+        match object.remove("schema") {
+            Some(Value::String(schema)) if schema == SCHEMA => {}
+            Some(other) => return Err(format!("schema {other} is not known; this gib reads \"{SCHEMA}\"")),
+            None => return Err(format!("schema is missing; {FORM}")),
         }
-        for (i, m) in moves.moves.iter().enumerate() {
+        let Some(Value::Array(list)) = object.remove("moves") else {
+            return Err(format!("moves is no list […]; {FORM}"));
+        };
+        let mut moves =
+            Moves { schema: SCHEMA.into(), axis: None, start_mm: 0.0, moves: Vec::with_capacity(list.len()) };
+        for (key, value) in object {
+            match (key.as_str(), value) {
+                ("axis", Value::Null) => {}
+                ("axis", Value::String(axis)) => moves.axis = Some(axis),
+                ("start_mm", Value::Number(start)) => moves.start_mm = start.as_f64().unwrap_or(f64::NAN),
+                (key @ ("axis" | "start_mm"), value) => return Err(format!("{key} cannot be {value}; {FORM}")),
+                (key, _) => return Err(format!("{key} has no meaning here; {FORM}")),
+            }
+        }
+        if !(moves.start_mm.abs() <= 1e6) {
+            return Err(format!("start_mm {} is out of range; give a number from -1000000 to 1000000", moves.start_mm));
+        }
+        for (i, value) in list.into_iter().enumerate() {
+            let m = Move::deserialize(&value).map_err(|_| format!("moves[{i}]: {value} is none of {MOVES}"))?;
             m.check().map_err(|why| format!("moves[{i}]: {why}"))?;
+            moves.moves.push(m);
         }
         Ok(moves)
     }
@@ -348,5 +373,17 @@ mod tests {
         );
         assert!(refused(r#"{"schema":"gib.moves/1","moves":[{"jump_mm":1}]}"#).contains("sweep_mm"));
         assert!(refused(r#"{"schema":"gib.moves/2","moves":[]}"#).contains("gib.moves/1"));
+        for text in [
+            "[]",
+            "3",
+            "{",
+            "{}",
+            r#"{"schema":"gib.moves/1","moves":3}"#,
+            r#"{"schema":"gib.moves/1","moves":[],"strat_mm":1}"#,
+        ] {
+            let why = refused(text);
+            assert!(why.contains("\"gib.moves/1\"") && why.contains("docs/diagnosis.md"), "{why}");
+        }
+        assert!(refused(r#"{"schema":"gib.moves/1","start_mm":1e300,"moves":[]}"#).contains("start_mm"));
     }
 }

@@ -434,7 +434,7 @@ mod tests {
     #[test]
     fn many_levels_are_those_of_each() {
         let p = physics(
-            r#"{"cause":"stribeck_friction","parameters":{"stribeck_torque_nm":-0.6,"stribeck_velocity_mm_s":5,"stribeck_exponent":1.4}},
+            r#"{"cause":"stribeck_friction","parameters":{"stribeck_torque_nm":-0.54,"stribeck_velocity_mm_s":5,"stribeck_exponent":1.4}},
                {"cause":"position_dependent_friction","parameters":{"centre_mm":100,"peak_nm":0.3,"width_mm":7,"steepness":8}},
                {"cause":"thermal_drift","parameters":{"drop_nm":0.3,"time_constant_s":20,"until_s":200}}"#,
         );
@@ -452,7 +452,7 @@ mod tests {
     #[test]
     fn a_dip_never_turns_friction_into_a_drive() {
         let p = physics(
-            r#"{"cause":"stribeck_friction","parameters":{"stribeck_torque_nm":-0.9,"stribeck_velocity_mm_s":5}}"#,
+            r#"{"cause":"stribeck_friction","parameters":{"stribeck_torque_nm":-0.52,"stribeck_velocity_mm_s":5}}"#,
         );
         assert_eq!(p.friction_level(0.0, 0.0, 0.0), 0.0);
     }

@@ -96,6 +96,22 @@ pub struct Trace {
 /// # Errors
 /// The axis has no servo, a setting is out of range, or the effects contradict the inertia; the sentence says which.
 pub fn simulate(axis: &Axis, command: &[f64], setup: &Setup) -> Result<Trace, String> {
+    simulate_watched(axis, command, setup, &mut |_| ())
+}
+
+/// Cycles after which it is told again how far a simulation is.
+const TOLD_EVERY: usize = 128;
+
+/// The same; `watch` is told from time to time what share of the cycles is done.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_watched(
+    axis: &Axis,
+    command: &[f64],
+    setup: &Setup,
+    watch: &mut dyn FnMut(f64),
+) -> Result<Trace, String> {
     let mut physics = Physics::of(axis)?;
     let mut noise = Noise::new(setup.seed);
     let ripples = physics.cogging.iter_mut().chain(&mut physics.vibration).chain(&mut physics.table_error);
@@ -105,7 +121,13 @@ pub fn simulate(axis: &Axis, command: &[f64], setup: &Setup) -> Result<Trace, St
     }
     let room = || Vec::with_capacity(command.len());
     let mut trace = Trace { position: room(), table_position: room(), torque: room(), ..Trace::default() };
-    simulate_cycles(axis, physics, command.iter().copied(), &[], setup, &mut noise, &mut trace)?;
+    let cycles = command.iter().enumerate().map(|(cycle, at)| {
+        if cycle % TOLD_EVERY == 0 {
+            watch(cycle as f64 / command.len() as f64);
+        }
+        *at
+    });
+    simulate_cycles(axis, physics, cycles, &[], setup, &mut noise, &mut trace)?;
     let Sensors { torque_noise, torque_grid, .. } = setup.sensors;
     trace.torque.iter_mut().for_each(|torque| *torque = on_grid(*torque + noise.normal(torque_noise), torque_grid));
     let period_s = axis.servo.map_or(0.0, |servo| servo.period_s);

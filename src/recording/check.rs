@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Column, Hole, Name, Recording, RecordingError, Sampling, Unit, file_row};
+use super::{Column, Hole, Name, Recording, RecordingError, Sampling, Signal, Unit, file_row};
 
 /// What kind of irregularity was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -21,6 +21,8 @@ pub enum IssueKind {
     Jump,
     /// Single rows stand far off both neighbours.
     Outlier,
+    /// Values are far beyond what the machine can do.
+    Implausible,
     /// A signal of the format comes in a unit it cannot have; the column is ignored.
     WrongUnit,
     /// A column outside the format; it is ignored.
@@ -62,7 +64,8 @@ pub(super) fn checked(file: &str, mut time_s: Vec<f64>, mut columns: Vec<Column>
     distinct(file, &columns)?;
     ordered(file, &time_s)?;
     let mut issues = Vec::new();
-    issues.extend(drop_repeats(file, &mut time_s, &mut columns)?);
+    let mut repeats = Vec::new();
+    issues.extend(drop_repeats(file, &mut time_s, &mut columns, &mut repeats)?);
     if time_s.len() < 2 {
         let found = match (time_s.is_empty(), issues.is_empty()) {
             (true, _) => "no rows of data; expected at least two",
@@ -76,11 +79,12 @@ pub(super) fn checked(file: &str, mut time_s: Vec<f64>, mut columns: Vec<Column>
     for column in &mut columns {
         issues.extend(name(column));
         issues.extend(not_finite(column));
+        issues.extend(spikes(column));
         if column.label.as_ref().is_some_and(|label| label.signal.is_measured_position()) {
             issues.extend(breaks(column));
         }
     }
-    Ok(Recording { file: file.to_owned(), time_s: time_s.into(), columns, sampling, holes, issues })
+    Ok(Recording { file: file.to_owned(), time_s: time_s.into(), columns, repeats, sampling, holes, issues })
 }
 
 fn same_length(file: &str, time_s: &[f64], columns: &[Column]) -> Result<(), RecordingError> {
@@ -130,7 +134,12 @@ fn ordered(file: &str, time_s: &[f64]) -> Result<(), RecordingError> {
 
 /// Keeps the first row of each time stamp. Few repeats are a recorder's stutter; many, with different values, mean that the
 /// time column is too coarse to say when anything happened.
-fn drop_repeats(file: &str, time_s: &mut Vec<f64>, columns: &mut [Column]) -> Result<Option<Issue>, RecordingError> {
+fn drop_repeats(
+    file: &str,
+    time_s: &mut Vec<f64>,
+    columns: &mut [Column],
+    after: &mut Vec<usize>,
+) -> Result<Option<Issue>, RecordingError> {
     let repeats: Vec<usize> = (1..time_s.len()).filter(|&row| time_s[row] == time_s[row - 1]).collect();
     let Some(&first) = repeats.first() else { return Ok(None) };
     let differs =
@@ -148,6 +157,7 @@ fn drop_repeats(file: &str, time_s: &mut Vec<f64>, columns: &mut [Column]) -> Re
         let mut flags = keep.iter();
         values.retain(|_| *flags.next().unwrap_or(&true));
     };
+    *after = repeats.iter().enumerate().map(|(before, row)| row - before - 1).collect();
     retain(time_s);
     columns.iter_mut().for_each(|column| retain(&mut column.values));
     Ok(Some(Issue {
@@ -208,6 +218,7 @@ fn name(column: &Column) -> Option<Issue> {
 }
 
 fn not_finite(column: &mut Column) -> Option<Issue> {
+    let ignored = column.label.is_none();
     let mut count = 0;
     let mut first = None;
     for (row, value) in column.values.iter_mut().enumerate() {
@@ -217,13 +228,46 @@ fn not_finite(column: &mut Column) -> Option<Issue> {
             first = first.or(Some(file_row(row)));
         }
     }
-    (count > 0).then(|| Issue {
+    (count > 0 && !ignored).then(|| Issue {
         kind: IssueKind::NotFinite,
         row: first,
         column: Some(column.name.clone()),
         count,
         message: "is empty or not a finite number; such rows are left out".into(),
     })
+}
+
+/// A torque that is so many times larger than in nearly all rows, and than in the rows beside it, is none.
+const SPIKE: f64 = 100.0;
+/// Values that tell how large a torque usually is.
+const ENOUGH: usize = 100_000;
+
+/// Leaves out single rows in which a torque or force is out of all proportion: a cell that was spoilt on its way into the file.
+fn spikes(column: &mut Column) -> Option<Issue> {
+    let signal = column.label.as_ref()?.signal;
+    if !matches!(signal, Signal::Torque | Signal::Force) || column.values.len() < 16 {
+        return None;
+    }
+    let hop = column.values.len() / ENOUGH + 1;
+    let mut sizes: Vec<f64> = column.values.iter().step_by(hop).map(|v| v.abs()).filter(|v| v.is_finite()).collect();
+    let most = sizes.len() * 99 / 100;
+    if sizes.is_empty() {
+        return None;
+    }
+    let usual = *sizes.select_nth_unstable_by(most, f64::total_cmp).1;
+    let size = |row: usize| column.values.get(row).map_or(0.0, |v| v.abs());
+    let is_spike =
+        |row: &usize| usual > 0.0 && size(*row) > SPIKE * usual.max(size(row.wrapping_sub(1))).max(size(row + 1));
+    let spikes: Vec<usize> = (0..column.values.len()).filter(is_spike).collect();
+    let &row = spikes.first()?;
+    let message = format!("is {}, far beyond all other rows; the row is left out", shown(column.values[row]));
+    spikes.iter().for_each(|row| column.values[*row] = f64::NAN);
+    Some(issue_at(column, IssueKind::Outlier, row, spikes.len(), message))
+}
+
+/// A number that may be of any size.
+fn shown(value: f64) -> String {
+    if (1e-3..1e9).contains(&value.abs()) { format!("{value}") } else { format!("{value:e}") }
 }
 
 /// Finds jumps and outliers of a measured position. A mass cannot jump: a step many times larger than both its neighbours is
@@ -410,13 +454,28 @@ mod tests {
     }
 
     #[test]
+    fn a_spoilt_torque_is_left_out_and_a_sudden_one_is_not() {
+        let sudden = |i: usize| if (300..310).contains(&i) { 40.0 } else { 0.05 * (i % 7) as f64 };
+        let torque: Vec<f64> = (0..1000).map(sudden).collect();
+        assert_eq!(kinds(&recording("x.torque_nm", torque.clone())), []);
+        for spoilt in [5000.0, -1e300] {
+            let mut torque = torque.clone();
+            torque[700] = spoilt;
+            let recording = recording("x.torque_nm", torque);
+            let said = recording.issues[0].to_string();
+            assert!(said.contains("row 702") && said.contains(&shown(spoilt)), "{said}");
+            assert!(recording.issues.len() == 1 && recording.columns[0].values[700].is_nan());
+        }
+    }
+
+    #[test]
     fn repeated_rows_are_dropped_and_a_coarse_clock_is_refused() {
         let mut time: Vec<f64> = (0..1000).map(|i| f64::from(i) * 1e-3).collect();
         time[500] = time[499];
         let values: Vec<f64> = (0..1000).map(f64::from).collect();
         let columns = vec![Column::new("x.position_mm", values.clone())];
         let recording = Recording::from_columns("r.csv", time, columns).unwrap();
-        assert_eq!(recording.rows(), 999);
+        assert_eq!((recording.rows(), &recording.repeats[..]), (999, [499].as_slice()));
         assert_eq!(kinds(&recording)[0], IssueKind::RepeatedTime);
 
         let coarse = (0..1000).map(|i| (f64::from(i) * 0.25).floor() * 1e-3).collect();

@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, BufReader, Read};
 
-use super::{Column, RecordingError, file_row};
+use super::{Column, RecordingError, file_row, is_ignored};
 
 /// Bytes read at a time. Large enough that system calls do not count, small enough to stay in the cache.
 const BUFFER_BYTES: usize = 256 * 1024;
@@ -38,7 +38,11 @@ pub(super) fn read(source: impl Read, file: &str, length: u64) -> Result<(Vec<f6
             values.iter_mut().for_each(|column| column.reserve(rows));
         }
         for ((cell, column), name) in record.iter().zip(&mut values).zip(&names) {
-            column.push(number(cell).ok_or_else(|| not_a_number(cell, file, name, row))?);
+            column.push(match number(cell) {
+                Some(value) => value,
+                None if is_ignored(name) => f64::NAN,
+                None => return Err(not_a_number(cell, file, name, row)),
+            });
         }
         row += 1;
     }
@@ -147,6 +151,17 @@ mod tests {
         assert!(recording.columns[0].values[2].is_nan());
         assert_eq!(recording.columns[1].values[0], 2.0);
         assert!(recording.columns[1].values[1].is_nan() && recording.columns[1].values[2].is_nan());
+    }
+
+    #[test]
+    fn what_stands_in_a_column_that_nobody_asks_for_is_ignored() {
+        let text = "time_s,operator,x.position_mm,x.torque_lbft\n0,Ann,1,a\n1,Bob,2,b\n2,7,3,c\n";
+        let recording = Recording::read_csv(text.as_bytes(), "r.csv", 0).unwrap();
+        assert_eq!(recording.columns[1].values, [1.0, 2.0, 3.0]);
+        let issues: Vec<_> = recording.issues.iter().map(|issue| issue.column.as_deref().unwrap()).collect();
+        assert_eq!(issues, ["operator", "x.torque_lbft"], "{:?}", recording.issues);
+        assert!(error(&text.replace("2,7,3,c", "2,7,late,c")).contains("\"late\""));
+        assert!(error(&text.replace("2,7,3,c", "late,7,3,c")).contains("\"late\""));
     }
 
     #[test]

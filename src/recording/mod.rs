@@ -20,6 +20,7 @@ pub mod sink;
 use std::borrow::Cow;
 use std::fs::File;
 use std::ops::Range;
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -79,6 +80,8 @@ pub struct Recording {
     pub time_s: Arc<Vec<f64>>,
     /// All columns but the time, in file order.
     pub columns: Vec<Column>,
+    /// Of each row that repeated the time of the one before it and was left out, the row that it followed.
+    pub repeats: Vec<usize>,
     /// How the rows lie in time.
     pub sampling: Sampling,
     /// Where rows are missing, in order.
@@ -273,6 +276,18 @@ impl Recording {
 
 fn finite(columns: &[&Column], row: usize) -> bool {
     columns.iter().all(|column| column.values.get(row).is_some_and(|value| value.is_finite()))
+}
+
+/// Whether two paths lead to one file, by whatever name or link.
+#[must_use]
+pub fn is_same_file(one: &Path, other: &Path) -> bool {
+    let file = |path: &Path| path.metadata().ok().filter(|meta| meta.is_file()).map(|meta| (meta.dev(), meta.ino()));
+    file(one).is_some_and(|one| file(other) == Some(one))
+}
+
+/// Whether a column of this name is left alone, whatever stands in it: nobody asks for it.
+fn is_ignored(name: &str) -> bool {
+    name != "time_s" && !matches!(Name::parse(name), Name::Known(_))
 }
 
 /// The row of the file in which data row `index` (from 0) stands: the header is row 1.

@@ -7,7 +7,7 @@ use ::parquet::file::reader::{FileReader, SerializedFileReader};
 use ::parquet::record::Field;
 
 use super::csv::header;
-use super::{Column, RecordingError, file_row};
+use super::{Column, RecordingError, file_row, is_ignored};
 
 /// Reads the time and all other columns, in file order.
 pub(super) fn read(path: &Path, file: &str) -> Result<(Vec<f64>, Vec<Column>), RecordingError> {
@@ -23,12 +23,14 @@ pub(super) fn read(path: &Path, file: &str) -> Result<(Vec<f64>, Vec<Column>), R
     for (index, row) in reader.get_row_iter(None).map_err(|why| broken(why.to_string()))?.enumerate() {
         let row = row.map_err(|why| broken(why.to_string()).at_row(file_row(index)))?;
         for (((_, field), column), name) in row.get_column_iter().zip(&mut values).zip(&names) {
-            let value = number(field).ok_or_else(|| {
-                RecordingError::new(file, format!("holds {field}; expected a number"))
-                    .at_row(file_row(index))
-                    .in_column(name)
-            })?;
-            column.push(value);
+            column.push(match number(field) {
+                Some(value) => value,
+                None if is_ignored(name) => f64::NAN,
+                None => {
+                    let error = RecordingError::new(file, format!("holds {field}; expected a number"));
+                    return Err(error.at_row(file_row(index)).in_column(name));
+                }
+            });
         }
     }
     let mut columns = names.iter().zip(values);

@@ -11,6 +11,7 @@ use gib::machine::Axis;
 use gib::recording::{Recording, Signal};
 use gib::report::lost_motion::{Display, picture, torque_picture};
 
+use super::outputs::Outputs;
 use super::{Answer, Result, machine_file};
 
 /// Measures the lost motion of an axis: what a reversal of the motor does not bring to the table
@@ -63,6 +64,9 @@ enum Method {
 impl LostMotionCommand {
     /// Measures and tells.
     pub fn run(&self) -> Result {
+        let inputs = [("<RECORDING>", Some(&*self.recording)), ("--machine", self.machine.as_deref())];
+        let mut outputs = Outputs::beside(&inputs);
+        outputs.add("--plot", self.plot.as_deref())?;
         let recording = Recording::open(&self.recording)?;
         let axis = super::axis(&recording, self.axis.as_deref())?;
         let model = self.model(&axis)?;
@@ -83,8 +87,8 @@ impl LostMotionCommand {
                 (torque::text(&recording.file, &found, measured), json, torque_picture(&found), found.trustworthy)
             }
         };
-        if let Some(path) = &self.plot {
-            std::fs::write(path, svg?).map_err(|why| format!("{}: cannot be written: {why}", path.display()))?;
+        if self.plot.is_some() {
+            outputs.picture("--plot", &svg?)?;
         }
         let text = if self.json { serde_json::to_string_pretty(&json)? + "\n" } else { text };
         Ok(Answer { text, good })
