@@ -5176,7 +5176,7 @@ int32_t gib_homing_last_error(const struct gib_homing *handle,
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
  *
- * @return the size in bytes, about 33 KiB.
+ * @return the size in bytes, about 30 KiB.
  *
  * [thread: any] [real-time: yes] [state: any]
  */
