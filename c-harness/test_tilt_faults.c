@@ -182,7 +182,7 @@ static void every_fault_in_every_phase(void **state)
                     assert_int_equal(gib_tilt_abort(r.kernel.gib), GIB_OK);
                 } else if (kind < 4) {
                     in.flags |= kind == 2 ? GIB_INPUT_FAULT : 1u << 20;
-                    wanted = GIB_ERR_DRIVE_FAULT;
+                    wanted = kind == 2 ? GIB_ERR_DRIVE_FAULT : GIB_ERR_CONFIG;
                     name = kind == 2 ? "" : "flags";
                 } else {
                     *field(&in, (kind - 4) / 4) = NO_NUMBERS[kind % 4];

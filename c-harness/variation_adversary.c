@@ -293,6 +293,13 @@ static int32_t cycle(variation_adversary *a)
     law(&a->base, status == a->out.status, "an output that is written");
     law(&a->base, gib_speed_variation_step(gib_of(a, 1), &a->last, &twin) == status && memcmp(&twin, &a->out, sizeof twin) == 0,
         "the same inputs, the same outputs");
+    /* The way back leads where the mean speed goes; what asks for less than the lowest, or for the other sense, leads there. */
+    double sense = copysign(1.0, a->config.speed_rpm), wanted = sense * a->last.speed_rpm, mean = a->mean_rpm;
+    if (was_busy && a->base.cycle > 1 && a->out.phase != GIB_SPEED_VARIATION_RUNNING && !(a->last.flags & GIB_INPUT_FAULT) &&
+        isfinite(wanted) && wanted <= given(a->config.speed_max_rpm, 2e5) * (1.0 + 1e-9)) {
+        a->mean_rpm = sense * fmax(wanted, fmax(a->config.speed_min_rpm, 0.001));
+        a->way_rpm += fabs(a->mean_rpm - mean);
+    }
     spoil(a);
     see_command(a);
     see_answer(a);
@@ -312,14 +319,15 @@ static double time_for_the_way(const variation_adversary *a, double speed_rpm)
     double mean = spindle_rad_s(fabs(a->mean_rpm)), from = spindle_rad_s(speed_rpm), fastest = fmax(mean, from), keep = 1.0 - g->reserve_ratio;
     double used = g->coulomb_nm + fmax(g->cutting_nm, a->true_cutting_nm);
     double most = keep * fmin(given(g->torque_nm, INFINITY), g->power_w / fastest), left = most - used - g->viscous_nm_s * fastest;
-    double has = mean > from ? left : left + used + g->coulomb_nm, pace = 0.1 * mean;
+    double has = mean > from ? left : left + used + g->coulomb_nm, pace = 0.1 * mean, way = spindle_rad_s(a->way_rpm);
+    has = a->way_rpm > 0.0 ? left : has;
     if (g->formula == GIB_SPEED_VARIATION_EXACT) {
         if (has <= 0.0) {
             return INFINITY;
         }
         pace = fmin(pace, 0.9955 * has / (g->inertia_kg_m2 + g->own_inertia_kg_m2));
     }
-    return (fmin(2.0 * fabs(mean - from) / pace, 600.0) + 1.0) / g->cycle_s + 3.0;
+    return (fmin(2.0 * (fabs(mean - from) + way) / pace, 600.0) + 1.0) / g->cycle_s + 3.0;
 }
 
 static void start(variation_adversary *a, int run)
@@ -343,7 +351,7 @@ static void start(variation_adversary *a, int run)
     a->s.integral = a->s.torque / (c.bandwidth_1_s * c.inertia_kg_m2);
     a->base.run = run;
     a->base.cycle = a->named = a->steady = 0;
-    a->loose_nm = a->true_cutting_nm = 0.0;
+    a->loose_nm = a->true_cutting_nm = a->way_rpm = 0.0;
     a->in = (gib_speed_variation_input){g->speed_rpm, 0.0, 0.0, 0.0, 0, 0};
     a->mean_rpm = g->speed_rpm;
     for (int i = run; i < 2; i++) {
@@ -385,8 +393,9 @@ static void vary(variation_adversary *a, int run)
         /* A motor that cannot has the time of one that can at a tenth of the mean speed in a second. */
         if (a->named && !was_named) {
             from = stood;
-            patience = (20.0 * fabs(speed / fabs(a->mean_rpm) - 1.0) + 1.0) / g->cycle_s + 3.0;
+            patience = (fmin(20.0 * fabs(speed / fabs(a->mean_rpm) - 1.0), 600.0) + 1.0) / g->cycle_s + 3.0;
         }
+        from = a->named && a->way_rpm > 0.0 ? fmax(from, speed) : from;
         if (a->named) {
             double time = time_for_the_way(a, from);
             cannot = cannot || isinf(time) || time * g->cycle_s > 600.0;

@@ -62,6 +62,7 @@ typedef struct {
     double own_rpm; /* gib's command, where a mistake stands for it */
     double loose_nm; /* torque by which the loop may exceed its feed-forward now */
     double high_rpm, low_rpm, mean_rpm; /* of the second run's last period; the mean speed asked for last */
+    double way_rpm; /* from the speed at the end of the variation to its mean, and all that this has moved since */
     _Alignas(16) unsigned char memory[2][VARIATION_MEMORY];
     int32_t status[2];
     double worst; /* largest share of power or torque that was demanded, as the meter read it */

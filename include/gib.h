@@ -1052,7 +1052,7 @@
 #define GIB_SPEED_VARIATION_FAILED 4
 
 /**
- * Input flag: end the variation; the speed goes back to its mean, then `GIB_DONE`.
+ * Input flag: end the variation; the speed goes back to its mean as it is asked for by then, then `GIB_DONE`.
  */
 #define GIB_SPEED_VARIATION_STOP 8
 
@@ -2525,7 +2525,8 @@ typedef struct gib_inertia_config {
      */
     double takeup_s;
     /**
-     * Time to listen, 256 cycles to 3600 s. Required for `GIB_INERTIA_LISTEN`.
+     * Longest time to listen, 256 cycles to 3600 s. Required for `GIB_INERTIA_LISTEN`, where `GIB_INERTIA_FINISH` may end it at any
+ * moment; not used by `GIB_INERTIA_RAMP`, 0 to 3600 s.
      */
     double listen_s;
     /**
@@ -2839,7 +2840,7 @@ typedef struct gib_speed_variation_config {
 typedef struct gib_speed_variation_input {
     /**
      * Mean spindle speed, rpm, with override; within the configuration's limits and in its sense, else
-     * GIB_ERR_SPEED_VARIATION_SPEED ends the variation.
+     * GIB_ERR_SPEED_VARIATION_SPEED ends the variation. Where nothing is varied: the speed asked for, of either sense, or 0.
      */
     double speed_rpm;
     /**
@@ -2886,7 +2887,7 @@ typedef struct gib_speed_variation_output {
      */
     double amplitude_limit_ratio;
     /**
-     * Shortest period possible at the amplitude asked for and the speed and cutting torque in effect, s; 0: none.
+     * Shortest period that the motor can do at the amplitude asked for and the speed and cutting torque in effect, s; 0: none.
      */
     double period_limit_s;
     /**
@@ -2916,7 +2917,8 @@ typedef struct gib_speed_variation_limits {
      */
     double amplitude_ratio;
     /**
-     * Shortest period for the amplitude given, s; 0: none does, or no amplitude was given.
+     * Shortest period for the amplitude given that the motor can do, s; 0: none does, or no amplitude was given. It may be
+ * shorter than a start takes, which is 0.02 s and 8 cycles.
      */
     double period_s;
     /**
@@ -2937,7 +2939,8 @@ typedef struct gib_speed_variation_limits {
      */
     double recommended_amplitude_ratio;
     /**
-     * Recommended period: the shortest for it that the motor can do, s; 0: none.
+     * Recommended period: the shortest for it that the motor can do and a start takes, but not below five revolutions, s;
+ * 0: none.
      */
     double recommended_period_s;
     /**
@@ -3342,8 +3345,8 @@ typedef struct gib_tilt_config {
      */
     double entry_mm;
     /**
-     * Time over which load is averaged before it is turned into depth, 8 cycles to 10 s (default 0.1; longer where the
-     * time limit needs it, see there).
+     * Time over which load is averaged before it is turned into depth, 8 cycles to 10 s (default 0.1, or 8 cycles where
+     * these are longer; longer where the time limit needs it, see there).
      */
     double block_s;
     /**
@@ -5197,7 +5200,7 @@ int32_t gib_homing_last_error(const struct gib_homing *handle,
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
  *
- * @return the size in bytes, about 13 KiB.
+ * @return the size in bytes, about 30 KiB.
  *
  * [thread: any] [real-time: yes] [state: any]
  */
@@ -5996,7 +5999,8 @@ struct gib_speed_variation *gib_speed_variation_new(void);
 void gib_speed_variation_free(struct gib_speed_variation *handle);
 
 /**
- * Checks the configuration and arms a variation, which begins with the next step at the mean speed.
+ * Checks the configuration and arms a variation, which begins with the next step at the mean speed: start it when the spindle
+ * is there.
  *
  * What the motor cannot do is refused: gib_speed_variation_last_error then names `amplitude_ratio` with the largest
  * possible one as upper bound.
@@ -6017,13 +6021,20 @@ int32_t gib_speed_variation_start(struct gib_speed_variation *handle,
 /**
  * One servo cycle: the speed command.
  *
- * It begins and ends at the mean speed without a jump. Mean speed, amplitude, period and cutting torque may change in
+ * It begins and ends at the mean speed without a jump, wherever that has gone meanwhile: on the way back, too, it may change in
+ * any cycle. Mean speed, amplitude, period and cutting torque may change in
  * any cycle; torque, power and speed stay within the motor's. Where more is asked for than it can do, the amplitude
  * is cut to what it can, and `message` says why. What a change leads to is worked out over the cycles that follow, a piece in
  * each: it takes effect within 20 cycles, and until then the variation goes on as before. Cutting torque counts at once.
  *
  * A fault is named in `message` in its cycle; the speed then goes back to its mean as after GIB_SPEED_VARIATION_STOP, with status
- * GIB_BUSY, and only then the error is returned. After a drive fault, and after any fault in the first step, gib lets go at once: that
+ * GIB_BUSY, and only then the error is returned. A speed of 0, too low or of the other sense (a spindle stop, a reversal) leads it
+ * to the lowest speed allowed, one that is too high or no number nowhere else.
+ *
+ * Idle, done or failed, the command is `speed_rpm` passed through: ramps are the kernel's again. Only where a variation ends at
+ * another speed than is asked for in that cycle does gib lead the command there first, through 0 where it turns the other way, within
+ * what the motor can do; done once they are equal, at once with GIB_INPUT_FAULT. After a first start a speed beyond
+ * `speed_max_rpm` in either sense is not passed through, and one that is no number never: the command stays. After a drive fault, and after any fault in the first step, gib lets go at once: that
  * step commands the speed asked for or, where that is no number, the last one within the limits, else the configuration's mean.
  *
  * @param handle the instance.
@@ -6031,7 +6042,7 @@ int32_t gib_speed_variation_start(struct gib_speed_variation *handle,
  * @param output command for this cycle; always written when not NULL.
  * @return GIB_OK when idle, GIB_BUSY, GIB_DONE after `GIB_SPEED_VARIATION_STOP`, or the first error, which is kept
  * until the next start: GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_CONFIG,
- * GIB_ERR_SPEED_VARIATION_SPEED; and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+ * GIB_ERR_SPEED_VARIATION_SPEED, GIB_ERR_SPEED_VARIATION_NONE where the motor cannot do the way back, also after a stop; and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
  *
  * [thread: cycle] [real-time: yes] [state: any]
  *
@@ -6183,8 +6194,8 @@ int32_t gib_tilt_start(struct gib_tilt *handle,
  * @param input values of this cycle.
  * @param output offsets for this cycle; always written when not NULL.
  * @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
- * GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_ACK_TIMEOUT, GIB_ERR_DEADLINE, GIB_ERR_TILT_...;
- * and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+ * GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_CONFIG for an unknown flag, GIB_ERR_ACK_TIMEOUT,
+ * GIB_ERR_DEADLINE, GIB_ERR_TILT_...; and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
  *
  * [thread: cycle] [real-time: yes] [state: any]
  *
@@ -6280,7 +6291,7 @@ int32_t gib_tilt_table_check(const struct gib_tilt_table *table,
  * Writes a table to a file, JSON `gib.tilt_table/1`, with its condition; whole or not at all.
  *
  * @param table the table; one that gib_tilt_table_check refuses is not written.
- * @param path the file, NUL-terminated; replaced when it is there.
+ * @param path the file, NUL-terminated; replaced when it is there, with its owner and mode kept.
  * @param detail receives what was wrong; may be NULL.
  * @return GIB_OK; GIB_ERR_IO, and as gib_tilt_table_check.
  *
@@ -6299,7 +6310,7 @@ int32_t gib_tilt_table_save(const struct gib_tilt_table *table,
  *
  * @param table receives the table; unchanged on any error. Its `struct_size` is set by the caller.
  * @param path the file, NUL-terminated.
- * @param detail receives what was wrong; `field` is "line" where the text is not JSON; may be NULL.
+ * @param detail receives what was wrong; `field` is "line" where the text is not JSON or not UTF-8; may be NULL.
  * @return GIB_OK; GIB_ERR_IO, GIB_ERR_FORMAT, and as gib_tilt_table_check.
  *
  * [thread: setup] [real-time: no] [state: none]

@@ -35,7 +35,7 @@ impl super::guard::Instance for GibInertia {
 
 /// Bytes that an instance needs in memory of your own, to be aligned to 16.
 ///
-/// @return the size in bytes, about 13 KiB.
+/// @return the size in bytes, about 30 KiB.
 ///
 /// [thread: any] [real-time: yes] [state: any]
 #[unsafe(no_mangle)]

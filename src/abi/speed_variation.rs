@@ -87,7 +87,8 @@ pub unsafe extern "C" fn gib_speed_variation_free(handle: *mut GibSpeedVariation
     unsafe { super::guard::release(handle) }
 }
 
-/// Checks the configuration and arms a variation, which begins with the next step at the mean speed.
+/// Checks the configuration and arms a variation, which begins with the next step at the mean speed: start it when the spindle
+/// is there.
 ///
 /// What the motor cannot do is refused: gib_speed_variation_last_error then names `amplitude_ratio` with the largest
 /// possible one as upper bound.
@@ -118,13 +119,20 @@ pub unsafe extern "C" fn gib_speed_variation_start(
 
 /// One servo cycle: the speed command.
 ///
-/// It begins and ends at the mean speed without a jump. Mean speed, amplitude, period and cutting torque may change in
+/// It begins and ends at the mean speed without a jump, wherever that has gone meanwhile: on the way back, too, it may change in
+/// any cycle. Mean speed, amplitude, period and cutting torque may change in
 /// any cycle; torque, power and speed stay within the motor's. Where more is asked for than it can do, the amplitude
 /// is cut to what it can, and `message` says why. What a change leads to is worked out over the cycles that follow, a piece in
 /// each: it takes effect within 20 cycles, and until then the variation goes on as before. Cutting torque counts at once.
 ///
 /// A fault is named in `message` in its cycle; the speed then goes back to its mean as after GIB_SPEED_VARIATION_STOP, with status
-/// GIB_BUSY, and only then the error is returned. After a drive fault, and after any fault in the first step, gib lets go at once: that
+/// GIB_BUSY, and only then the error is returned. A speed of 0, too low or of the other sense (a spindle stop, a reversal) leads it
+/// to the lowest speed allowed, one that is too high or no number nowhere else.
+///
+/// Idle, done or failed, the command is `speed_rpm` passed through: ramps are the kernel's again. Only where a variation ends at
+/// another speed than is asked for in that cycle does gib lead the command there first, through 0 where it turns the other way, within
+/// what the motor can do; done once they are equal, at once with GIB_INPUT_FAULT. After a first start a speed beyond
+/// `speed_max_rpm` in either sense is not passed through, and one that is no number never: the command stays. After a drive fault, and after any fault in the first step, gib lets go at once: that
 /// step commands the speed asked for or, where that is no number, the last one within the limits, else the configuration's mean.
 ///
 /// @param handle the instance.
@@ -132,7 +140,7 @@ pub unsafe extern "C" fn gib_speed_variation_start(
 /// @param output command for this cycle; always written when not NULL.
 /// @return GIB_OK when idle, GIB_BUSY, GIB_DONE after `GIB_SPEED_VARIATION_STOP`, or the first error, which is kept
 /// until the next start: GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_CONFIG,
-/// GIB_ERR_SPEED_VARIATION_SPEED; and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+/// GIB_ERR_SPEED_VARIATION_SPEED, GIB_ERR_SPEED_VARIATION_NONE where the motor cannot do the way back, also after a stop; and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
 ///
 /// [thread: cycle] [real-time: yes] [state: any]
 ///

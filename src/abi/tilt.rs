@@ -145,8 +145,8 @@ pub unsafe extern "C" fn gib_tilt_start(
 /// @param input values of this cycle.
 /// @param output offsets for this cycle; always written when not NULL.
 /// @return GIB_OK when idle, GIB_BUSY, GIB_DONE, or the first error, which is kept until the next start:
-/// GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_ACK_TIMEOUT, GIB_ERR_DEADLINE, GIB_ERR_TILT_...;
-/// and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
+/// GIB_ERR_ABORTED, GIB_ERR_NON_FINITE, GIB_ERR_DRIVE_FAULT, GIB_ERR_CONFIG for an unknown flag, GIB_ERR_ACK_TIMEOUT,
+/// GIB_ERR_DEADLINE, GIB_ERR_TILT_...; and GIB_ERR_NULL, GIB_ERR_HANDLE of this call.
 ///
 /// [thread: cycle] [real-time: yes] [state: any]
 ///
@@ -323,7 +323,7 @@ pub unsafe extern "C" fn gib_tilt_table_check(table: *const TiltTable, detail: *
 /// Writes a table to a file, JSON `gib.tilt_table/1`, with its condition; whole or not at all.
 ///
 /// @param table the table; one that gib_tilt_table_check refuses is not written.
-/// @param path the file, NUL-terminated; replaced when it is there.
+/// @param path the file, NUL-terminated; replaced when it is there, with its owner and mode kept.
 /// @param detail receives what was wrong; may be NULL.
 /// @return GIB_OK; GIB_ERR_IO, and as gib_tilt_table_check.
 ///
@@ -351,7 +351,7 @@ pub unsafe extern "C" fn gib_tilt_table_save(
 ///
 /// @param table receives the table; unchanged on any error. Its `struct_size` is set by the caller.
 /// @param path the file, NUL-terminated.
-/// @param detail receives what was wrong; `field` is "line" where the text is not JSON; may be NULL.
+/// @param detail receives what was wrong; `field` is "line" where the text is not JSON or not UTF-8; may be NULL.
 /// @return GIB_OK; GIB_ERR_IO, GIB_ERR_FORMAT, and as gib_tilt_table_check.
 ///
 /// [thread: setup] [real-time: no] [state: none]

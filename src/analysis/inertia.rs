@@ -143,7 +143,7 @@ pub fn measure(recording: &Recording, options: &Options) -> Result<Found, Record
     let (target, own, process_step) = (options.target, options.own, options.process_step);
     let mut length = (recording.rows() * 5 / (BLOCKS * 4)).max(SHORTEST);
     loop {
-        let mut gather = Gather::new(gate, length as u32, period, torque_nm);
+        let mut gather = Gather::new(gate, length as u32, period, torque_nm, false);
         for run in &runs {
             gather.leave_out(2); // the median of three is full of the stretch before
             for (speed, torque) in uniform(recording, &speed, &torque, run.clone()) {
@@ -152,15 +152,17 @@ pub fn measure(recording: &Recording, options: &Options) -> Result<Found, Record
         }
         let (torque_step, speed_step) = (gather.torque_step(), gather.speed_step());
         let question = Question { sample_s: period, torque_step, speed_step, target, own, process_step };
-        let (report, verdict) = InertiaReport::of(gather.blocks(), length as u32, &question);
+        let (all, used, _) = gather.blocks();
+        let blocks = all[..used].to_vec();
+        let (report, verdict) = InertiaReport::of(&blocks, length as u32, &question);
         let refused = verdict.err().map(Refusal);
         // Lost in the noise of the speed: blocks of twice the length calm the acceleration by 2√2.
         let noisy = |fault: Fault| fault.code == GIB_ERR_INERTIA_EXCITATION && fault.field.starts_with("acceleration");
-        if refused.is_some_and(|Refusal(fault)| noisy(fault)) && gather.blocks().len() > 40 {
+        if refused.is_some_and(|Refusal(fault)| noisy(fault)) && used > 40 {
             length *= 2;
             continue;
         }
-        let (blocks, block_s) = (gather.blocks().to_vec(), length as f64 * period);
+        let block_s = length as f64 * period;
         return Ok(Found { report, refused, blocks, block_s, torque_column: torque_column.name.clone() });
     }
 }

@@ -89,8 +89,13 @@ pub fn to_json(table: &TiltTable) -> Value {
 /// # Errors
 /// The file cannot be read, is not JSON (with its line), or holds what [`TiltTable::check`] refuses.
 pub fn load(file: &Path) -> Result<TiltTable, Error> {
-    let text = std::fs::read_to_string(file)
+    let bytes = std::fs::read(file)
         .map_err(|e| error(Fault::of(GIB_ERR_IO), format!("{}: cannot read the load table: {e}", file.display())))?;
+    let text = String::from_utf8(bytes).map_err(|e| {
+        let good = e.as_bytes().iter().take(e.utf8_error().valid_up_to());
+        let line = 1.0 + good.filter(|byte| **byte == b'\n').count() as f64;
+        error(format_fault("line\0", line), format!("{}: line {line} is not UTF-8", file.display()))
+    })?;
     parse(&text).map_err(|e| error(e.fault, format!("{}: {e}", file.display())))
 }
 
@@ -198,6 +203,15 @@ mod tests {
         let falling = TiltTable { load: [1.0; GIB_TILT_ROWS], ..table() };
         assert_eq!(save(&falling, &file).unwrap_err().fault.field, "load\0");
         assert_eq!(load(&file).unwrap(), table(), "a refused table leaves the old file");
+    }
+
+    #[test]
+    fn text_that_is_not_utf_8_is_named_with_its_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("table.json");
+        std::fs::write(&file, b"{\n \"a\": \"\xfc\"\n}\n").unwrap();
+        let fault = load(&file).unwrap_err().fault;
+        assert_eq!((fault.code, fault.field, fault.value), (GIB_ERR_FORMAT, "line\0", 2.0));
     }
 
     #[test]

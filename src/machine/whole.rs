@@ -2,11 +2,11 @@
 
 use crate::error::{Fault, GIB_ERR_FORMAT, GIB_ERR_IO};
 use std::fs::{self, File};
-use std::io::{Result, Write};
+use std::io::{ErrorKind, Result, Write};
 use std::path::Path;
 
 /// Replaces a file by `text`: written beside it, brought to the disk, put in its place. A symbolic link is followed; a
-/// device or a pipe, which cannot be replaced, is written to.
+/// device or a pipe, which cannot be replaced, is written to. Owner, mode and access list stay those of the file that was there.
 ///
 /// # Errors
 /// The system's; the file is then as it was, and nothing is left beside it.
@@ -20,6 +20,11 @@ pub fn replace(file: &Path, text: &str) -> Result<()> {
     let beside = file.with_file_name(name);
     let write = || {
         let mut new = File::create(&beside)?;
+        match File::open(&file) {
+            Ok(old) => crate::program::dressed(&old, &new)?,
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) => return Err(error),
+        }
         new.write_all(text.as_bytes())?;
         new.sync_all()?;
         fs::rename(&beside, &file)
@@ -43,6 +48,19 @@ pub fn text(path: &Path) -> std::result::Result<String, Fault> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_mode_stays() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("m.json");
+        replace(&file, "old").unwrap();
+        for mode in [0o604, 0o660] {
+            fs::set_permissions(&file, fs::Permissions::from_mode(mode)).unwrap();
+            replace(&file, "new").unwrap();
+            assert_eq!(fs::metadata(&file).unwrap().permissions().mode() & 0o777, mode);
+        }
+    }
 
     #[test]
     fn the_old_or_the_new_is_there_and_nothing_beside_it() {

@@ -51,7 +51,8 @@ pub(super) fn remove(head: &Head, scope: Scope) -> Option<Splice> {
         (true, "") => start - previous_ending.len() as u64..end,
         (true, _) => start..end,
     };
-    Some(Splice { at: bytes.start, delete: bytes.end - bytes.start, insert: Vec::new() })
+    let insert = if found.parts { b" ".to_vec() } else { Vec::new() };
+    Some(Splice { at: bytes.start, delete: bytes.end - bytes.start, insert })
 }
 
 fn some_ending(ending: &'static str) -> &'static str {
@@ -127,6 +128,21 @@ mod tests {
         assert_eq!(without(b"/ VARIABLE INA=0.5 \r\nG0", program), b"G0");
         assert_eq!(without(b"G21\n(INA=0.5)", program), b"G21");
         assert_eq!(without(b"G21\n", program), b"G21\n");
+        assert_eq!(without(b"(a)(INA=0.5)G21\nG0", program), b"(a)G21\nG0");
+        assert_eq!(without(b"G21(INA=0.5);b\nG0", program), b"G21;b\nG0");
+    }
+
+    #[test]
+    fn removing_leaves_words_apart() {
+        let step = Scope::Step(2);
+        for (before, after) in [
+            (&b"INA=0.5(INA2=0.4)G21\nG0"[..], &b"INA=0.5 G21\nG0"[..]),
+            (b"VC1=5(INA2=0.4)1\nG0", b"VC1=5 1\nG0"),
+            (b"/(INA2=0.4)N10 G21\nG0", b"/ N10 G21\nG0"),
+        ] {
+            assert_eq!(String::from_utf8_lossy(&without(before, step)), String::from_utf8_lossy(after));
+        }
+        assert_eq!(value(&without(b"INA=0.5(INA2=0.4)G21\nG0", step), Scope::Program), Some(0.5));
     }
 
     #[test]

@@ -32,6 +32,8 @@ pub(super) struct Found {
     pub text: Range<u64>,
     pub number: Range<u64>,
     pub alone: bool,
+    /// Without it what stands before and behind it would be one word.
+    pub parts: bool,
     /// The line for messages.
     pub quote: String,
 }
@@ -96,6 +98,9 @@ impl Head {
 
     fn add(&mut self, line: u64, place: Place, statement: &Statement, text: &[u8]) -> Result<(), Problem> {
         let Statement { scope, dialect, inertia_kg_m2, alone, .. } = *statement;
+        let (before, after) = (text.get(..statement.text.start), text.get(statement.text.end..));
+        let word = |byte: Option<&u8>| byte.is_some_and(|b| !b.is_ascii_whitespace() && !b"();".contains(b));
+        let parts = word(before.and_then(<[u8]>::last)) && word(after.and_then(<[u8]>::first));
         let quote = quoted(text);
         if let Some(first) = self.found.iter().find(|found| found.entry.scope == scope) {
             let first = (first.entry.line, first.quote.clone());
@@ -104,7 +109,7 @@ impl Head {
         let in_file = |range: &Range<usize>| place.start + range.start as u64..place.start + range.end as u64;
         let (text, number) = (in_file(&statement.text), in_file(&statement.number));
         let entry = Entry { scope, inertia_kg_m2, line, dialect };
-        self.found.push(Found { entry, place, text, number, alone, quote });
+        self.found.push(Found { entry, place, text, number, alone, parts, quote });
         Ok(())
     }
 }

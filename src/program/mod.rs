@@ -23,6 +23,7 @@ mod replace;
 
 pub use dialect::Dialect;
 pub use error::{Error, Problem};
+pub(crate) use replace::dressed;
 
 use head::Head;
 use std::fmt;

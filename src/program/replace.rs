@@ -253,6 +253,17 @@ fn dress(old: &File, status: &Stat, new: &File) -> Result<(), Problem> {
     Ok(())
 }
 
+/// The same for any file that is replaced by another.
+///
+/// # Errors
+/// The system's, where one of them cannot be kept.
+pub fn dressed(old: &File, new: &File) -> std::io::Result<()> {
+    dress(old, &fs::fstat(old)?, new).map_err(|problem| match problem {
+        Problem::Io { source, .. } | Problem::Owner { source, .. } => source,
+        _ => ErrorKind::Other.into(),
+    })
+}
+
 /// Copies what users see: the access list and `user.…`; the rest is the system's own to give.
 fn copy_attributes(old: &File, new: &File) -> SysResult<()> {
     let names = match attribute(|buffer| fs::flistxattr(old, buffer)) {

@@ -19,6 +19,8 @@
 //! in sixteen are, by much (after Hampel). Samples that say nothing about inertia
 //! end a block without trace: standing still, take-up, field weakening, saturation.
 
+use super::kept::{Course, Kept, Whole};
+
 /// Blocks that a measurement can hold.
 pub const BLOCKS: usize = 512;
 
@@ -71,13 +73,15 @@ pub struct Gather {
     /// True while samples are left out.
     skips: bool,
     length: u32,
-    /// What makes Σψ·x a mean in rad/s and N·m, and Σu·ω an acceleration.
+    /// What makes S₁ a mean in rad/s and N·m, and what makes Σu·x and Σψ·x a slope and a mean in these.
     mean: [f64; 2],
-    slope: f64,
+    weighted: [f64; 2],
+    cycle_s: f64,
     torque_nm: f64,
     last_torque: f64,
-    used: usize,
-    blocks: [Block; BLOCKS],
+    /// The block under way began where the last one kept ended.
+    follows: bool,
+    kept: Kept,
 }
 
 /// Both signals on their way past the wild samples.
@@ -142,19 +146,16 @@ impl Calm {
 
 impl Default for Gather {
     fn default() -> Gather {
-        Gather::new(Gate { standstill: 0.0, base: f64::MAX, saturation: f64::MAX, takeup: 0 }, 4, 1e-3, 1.0)
+        Gather::new(Gate { standstill: 0.0, base: f64::MAX, saturation: f64::MAX, takeup: 0 }, 4, 1e-3, 1.0, false)
     }
 }
 
 impl Gather {
-    /// Empty, for blocks of `length` samples (at least 4), one every `cycle_s`, `torque_nm` N·m per unit of the input.
+    /// Empty, for blocks of `length` samples (at least 4), one every `cycle_s`, `torque_nm` N·m per unit of the input. Where more
+    /// come than there is room for, they get longer, or with `joins` false later ones are left out.
     #[must_use]
-    pub fn new(gate: Gate, length: u32, cycle_s: f64, torque_nm: f64) -> Gather {
-        let length = length.max(4);
-        let n = f64::from(length);
-        let weights = n * (n * n - 1.0) / 12.0;
-        let rad_s = crate::units::rad_s_from_rpm(1.0);
-        Gather {
+    pub fn new(gate: Gate, length: u32, cycle_s: f64, torque_nm: f64, joins: bool) -> Gather {
+        let mut gather = Gather {
             calm: Calm::default(),
             standstill: gate.standstill,
             least: Sample([gate.standstill, 0.0]),
@@ -163,20 +164,32 @@ impl Gather {
             sums: [Sample::default(); 3],
             run: gate.takeup.max(2), // the median is full after two samples
             skips: true,
-            length,
-            mean: [0.5 * rad_s / weights, 0.5 * torque_nm / weights],
-            slope: rad_s / (weights * cycle_s),
+            length: 4,
+            mean: [0.0; 2],
+            weighted: [0.0; 2],
+            cycle_s,
             torque_nm,
             last_torque: 0.0,
-            used: 0,
-            blocks: [Block::default(); BLOCKS],
-        }
+            follows: false,
+            kept: Kept::new(joins),
+        };
+        gather.make_long(length.max(4));
+        gather
     }
 
-    /// The blocks gathered.
+    /// Blocks that begin from now on are of so many samples.
+    fn make_long(&mut self, length: u32) {
+        let n = f64::from(length);
+        let weights = n * (n * n - 1.0) / 12.0;
+        let units = [crate::units::rad_s_from_rpm(1.0), self.torque_nm];
+        (self.length, self.mean, self.weighted) =
+            (length, units.map(|unit| unit / n), units.map(|unit| unit / weights));
+    }
+
+    /// The blocks gathered, all of one length, how many, and that length in samples. Not for the cycle.
     #[must_use]
-    pub fn blocks(&self) -> &[Block] {
-        self.blocks.get(..self.used).unwrap_or(&[])
+    pub fn blocks(&self) -> ([Block; BLOCKS], usize, u32) {
+        self.kept.all(self.length, self.cycle_s)
     }
 
     /// Smallest step seen between two torques, N·m; 0 where none was.
@@ -193,17 +206,12 @@ impl Gather {
         if step < f64::MAX { crate::units::rad_s_from_rpm(step) } else { 0.0 }
     }
 
-    /// Samples in a block.
-    #[must_use]
-    pub fn length(&self) -> u32 {
-        self.length
-    }
-
     /// Leaves the next `samples` out and begins a new block after them.
     pub fn leave_out(&mut self, samples: u32) {
         self.skips = samples > 0;
         self.run = if self.skips { samples } else { self.length };
         self.sums = [Sample::default(); 3];
+        self.follows = false;
     }
 
     /// Gathers from here on, after `samples` that are left out.
@@ -281,20 +289,21 @@ impl Gather {
         }
         let n = f64::from(self.length);
         let [first, second, third] = self.sums.map(|sum| sum.0);
-        let weighted = |k: usize| (n + 2.0) * second[k] - 0.5 * (n + 1.0) * first[k] - 2.0 * third[k];
-        let block = Block {
-            torque: weighted(1) * self.mean[1],
-            speed: weighted(0) * self.mean[0],
-            acceleration: (0.5 * (n + 1.0) * first[0] - second[0]) * self.slope,
+        let course = |k: usize| Course {
+            mean: first[k] * self.mean[k],
+            slope: (0.5 * (n + 1.0) * first[k] - second[k]) * self.weighted[k],
+            weighted: ((n + 2.0) * second[k] - 0.5 * (n + 1.0) * first[k] - 2.0 * third[k]) * 0.5 * self.weighted[k],
         };
-        let same_sense = block.torque * self.last_torque >= 0.0;
-        self.last_torque = block.torque;
+        let whole = Whole { speed: course(0), torque: course(1), follows: self.follows };
+        let torque = whole.torque.weighted;
+        let same_sense = torque * self.last_torque >= 0.0;
+        self.last_torque = torque;
+        if same_sense && self.kept.add(whole, self.length) {
+            self.make_long(self.length.saturating_mul(2));
+        }
         // Belts and gears change flank: what follows accelerates less than the torque says.
         self.leave_out(if same_sense { 0 } else { self.takeup });
-        if same_sense && let Some(place) = self.blocks.get_mut(self.used) {
-            *place = block;
-            self.used += 1;
-        }
+        self.follows = same_sense;
     }
 }
 
@@ -303,20 +312,25 @@ mod tests {
     use super::*;
     use crate::units::{rad_s_from_rpm, rpm_from_rad_s};
 
+    fn blocks(gather: &Gather) -> Vec<Block> {
+        let (blocks, used, _) = gather.blocks();
+        blocks[..used].to_vec()
+    }
+
     fn gate() -> Gate {
         Gate { standstill: 1.0, base: 5000.0, saturation: 40.0, takeup: 10 }
     }
 
     #[test]
     fn a_ramp_is_its_slope_and_a_wild_sample_leaves_no_trace() {
-        let mut gather = Gather::new(gate(), 20, 1e-3, 0.5);
+        let mut gather = Gather::new(gate(), 20, 1e-3, 0.5, false);
         for i in 0..500 {
             let (speed, torque) = (100.0 + 30.0 * f64::from(i) * 1e-3, 8.0);
             let wild = i % 50 == 7;
             gather.add(if wild { 4000.0 } else { speed }, if wild { -39.0 } else { torque });
         }
-        assert!(gather.blocks().len() >= 20);
-        for block in gather.blocks() {
+        assert!(blocks(&gather).len() >= 20);
+        for block in blocks(&gather) {
             assert!((block.acceleration - rad_s_from_rpm(30.0)).abs() < 0.05 * rad_s_from_rpm(30.0), "{block:?}");
             assert!((block.torque - 4.0).abs() < 1e-9);
         }
@@ -327,13 +341,13 @@ mod tests {
     #[test]
     fn steps_of_a_coarse_grid_are_kept() {
         const STEP: f64 = 14.6;
-        let mut gather = Gather::new(gate(), 1000, 1e-3, 1.0);
+        let mut gather = Gather::new(gate(), 1000, 1e-3, 1.0, false);
         let counts = |t: f64| (t * (100.0 + 0.5 * 30.0 * t) / (STEP * 1e-3)).floor();
         for i in 0..60_000 {
             let t = f64::from(i) * 1e-3;
             gather.add(STEP * (counts(t) - counts(t - 1e-3)), 8.0);
         }
-        let mean = |of: fn(&Block) -> f64| gather.blocks().iter().map(of).sum::<f64>() / gather.blocks().len() as f64;
+        let mean = |of: fn(&Block) -> f64| blocks(&gather).iter().map(of).sum::<f64>() / blocks(&gather).len() as f64;
         assert!((mean(|b| b.acceleration) / rad_s_from_rpm(30.0) - 1.0).abs() < 2e-3, "{}", mean(|b| b.acceleration));
         let scatter = mean(|b| (b.acceleration - rad_s_from_rpm(30.0)).powi(2)).sqrt();
         assert!(scatter < 0.01 * rad_s_from_rpm(30.0), "{scatter}");
@@ -343,36 +357,36 @@ mod tests {
     #[test]
     fn balance_holds_for_curved_motion() {
         let (j, b) = (0.006, 0.001);
-        let mut gather = Gather::new(gate(), 60, 1e-3, 1.0);
+        let mut gather = Gather::new(gate(), 60, 1e-3, 1.0, false);
         for i in 0..3000 {
             let t = f64::from(i) * 1e-3;
             let omega = 100.0 + 40.0 * (9.0 * t).sin();
             gather.add(rpm_from_rad_s(omega), 30.0 + j * 360.0 * (9.0 * t).cos() + b * omega);
         }
-        for block in gather.blocks() {
+        for block in blocks(&gather) {
             let expected = 30.0 + j * block.acceleration + b * block.speed;
             assert!((block.torque - expected).abs() < 1e-3, "{block:?} {expected}");
         }
-        assert!(gather.blocks().len() > 40);
+        assert!(blocks(&gather).len() > 40);
     }
 
     #[test]
     fn standstill_weakening_and_saturation_leave_nothing() {
         for (speed, torque) in [(0.5, 5.0), (6000.0, 5.0), (100.0, 45.0)] {
-            let mut gather = Gather::new(gate(), 8, 1e-3, 1.0);
+            let mut gather = Gather::new(gate(), 8, 1e-3, 1.0, false);
             (0..400).for_each(|_| gather.add(speed, torque));
-            assert!(gather.blocks().is_empty(), "{speed} {torque}");
+            assert!(blocks(&gather).is_empty(), "{speed} {torque}");
         }
     }
 
     #[test]
     fn take_up_after_a_change_of_flank_is_left_out() {
-        let mut gather = Gather::new(gate(), 10, 1e-3, 1.0);
+        let mut gather = Gather::new(gate(), 10, 1e-3, 1.0, false);
         for i in 0..200 {
             gather.add(1000.0, if i < 100 { 5.0 } else { -5.0 });
         }
-        assert!(gather.blocks().iter().filter(|b| b.torque > 0.0).count() >= 8);
-        let after = gather.blocks().iter().filter(|b| b.torque < 0.0).count();
+        assert!(blocks(&gather).iter().filter(|b| b.torque > 0.0).count() >= 8);
+        let after = blocks(&gather).iter().filter(|b| b.torque < 0.0).count();
         assert!((6..=8).contains(&after), "{after}");
     }
 }

@@ -40,7 +40,8 @@ pub struct InertiaConfig {
     /// Time after each change of acceleration or sense that is left out: take-up of belts and gears, and the
     /// drive's own transients, up to 5 s (default 0.1).
     pub takeup_s: f64,
-    /// Time to listen, 256 cycles to 3600 s. Required for `GIB_INERTIA_LISTEN`.
+    /// Longest time to listen, 256 cycles to 3600 s. Required for `GIB_INERTIA_LISTEN`, where `GIB_INERTIA_FINISH` may end it at any
+    /// moment; not used by `GIB_INERTIA_RAMP`, 0 to 3600 s.
     pub listen_s: f64,
     /// Speed below which the spindle counts as standing, rpm, up to 1000 (default 1).
     pub standstill_rpm: f64,

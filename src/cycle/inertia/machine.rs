@@ -1,6 +1,6 @@
 //! The state machine of a measurement: ramps commanded by gib, or listening. The result is fitted off the cycle.
 
-use super::blocks::{Block, Gather};
+use super::blocks::Gather;
 use super::fit::Question;
 use super::io::*;
 use super::plan::Plan;
@@ -95,7 +95,7 @@ impl Inertia {
         let plan = plan?;
         self.plan = plan;
         self.fault = Fault::NONE;
-        self.gather = Gather::new(plan.gate, plan.block, plan.cycle_s, plan.torque_nm);
+        self.gather = Gather::new(plan.gate, plan.block, plan.cycle_s, plan.torque_nm, plan.listen);
         let cycles = if plan.listen { plan.listen_cycles } else { plan.gathering() };
         self.progress_step = (1.0 - 1e-9) / f64::from(cycles.max(1)); // never above 1 by rounding
         self.output.progress_ratio = 0.0;
@@ -129,12 +129,6 @@ impl Inertia {
         self.fault
     }
 
-    /// The blocks gathered, for a graph.
-    #[must_use]
-    pub fn blocks(&self) -> &[Block] {
-        self.gather.blocks()
-    }
-
     /// Fits what was gathered. Off the cycle: takes 10 to 150 ms.
     ///
     /// # Errors
@@ -145,7 +139,8 @@ impl Inertia {
         }
         let (torque_step, speed_step) = (self.gather.torque_step(), self.gather.speed_step());
         let question = Question { torque_step, speed_step, ..self.plan.question };
-        Ok(InertiaReport::of(self.gather.blocks(), self.gather.length(), &question))
+        let (blocks, used, length) = self.gather.blocks();
+        Ok(InertiaReport::of(blocks.get(..used).unwrap_or(&[]), length, &question))
     }
 
     /// One servo cycle.

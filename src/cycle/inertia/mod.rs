@@ -16,6 +16,7 @@ pub mod config;
 pub mod doubt;
 pub mod fit;
 pub mod io;
+pub mod kept;
 pub mod machine;
 pub mod plan;
 pub mod report;

@@ -115,9 +115,11 @@ impl Plan {
         if listen {
             let shortest = cycle * 4.0 * BLOCKS as f64 / 8.0;
             plan.listen_cycles = cycles(in_range("listen_s\0", c.listen_s, shortest, 3600.0)?);
-            // The steps of a counted speed are as large as what a few samples change by: sixteen calm them, where that leaves 128 blocks.
-            plan.block = (plan.listen_cycles / PLANNED).max((plan.listen_cycles / 128).min(16)).max(4);
+            // The steps of a counted speed are as large as what a few samples change by: sixteen calm them, where that leaves 128
+            // blocks. In a long time they get longer as they come: it may end early.
+            plan.block = (plan.listen_cycles / 128).min(16).max(4);
         } else {
+            in_range("listen_s\0", c.listen_s, 0.0, 3600.0)?;
             plan.add_ramps(c, takeup)?;
         }
         Ok(plan)
@@ -215,12 +217,15 @@ mod tests {
         assert_eq!(field(InertiaConfig { torque_unit: GIB_TORQUE_AMPERE, ..valid() }), "torque_constant_nm_a\0");
         assert_eq!(field(InertiaConfig { mode: GIB_INERTIA_LISTEN, ..valid() }), "listen_s\0");
         assert_eq!(field(InertiaConfig { speed_high_rpm: f64::NAN, ..valid() }), "speed_high_rpm\0");
+        for listen_s in [f64::NAN, f64::INFINITY, -1.0] {
+            assert_eq!(field(InertiaConfig { listen_s, ..valid() }), "listen_s\0", "also where gib ramps");
+        }
         assert_eq!(field(InertiaConfig { own_inertia_kg_m2: -1.0, ..valid() }), "own_inertia_kg_m2\0");
     }
 
     #[test]
     fn a_short_time_to_listen_is_cut_into_blocks_that_calm_a_counted_speed() {
-        for (listen_s, block) in [(0.3, 4), (1.0, 7), (2.5, 16), (6.0, 16), (60.0, 146)] {
+        for (listen_s, block) in [(0.3, 4), (1.0, 7), (2.5, 16), (6.0, 16), (60.0, 16), (3600.0, 16)] {
             let config = InertiaConfig { mode: GIB_INERTIA_LISTEN, listen_s, ..valid() };
             assert_eq!(Plan::new(&config).unwrap().block, block, "{listen_s} s");
         }

@@ -385,3 +385,40 @@ fn every_fault_in_every_state_ends_safely() {
     println!("states in which faults were put: {states:?}");
     assert!(states.len() >= 5);
 }
+
+/// Ended early, a measurement that listens says the same whatever time it was allowed.
+#[test]
+fn what_is_heard_does_not_depend_on_how_long_it_might_have_been() {
+    let mut found: Vec<InertiaReport> = vec![];
+    for listen_s in [15.0, 60.0, 300.0, 3600.0] {
+        let config = InertiaConfig {
+            struct_size: size_of::<InertiaConfig>() as u32,
+            mode: GIB_INERTIA_LISTEN,
+            cycle_s: CYCLE,
+            listen_s,
+            ..InertiaConfig::default()
+        };
+        let (mut machine, mut random, mut speed_rpm) = (Inertia::default(), Random(5), 300.0);
+        machine.start(Plan::new(&config)).unwrap();
+        for cycle in 0..=14_000 {
+            let (t, pace) = (f64::from(cycle % 7000) * CYCLE, if cycle < 7000 { 900.0 } else { 540.0 });
+            let rpm_s = if t < 3.0 {
+                pace
+            } else if (3.5..6.5).contains(&t) {
+                -pace
+            } else {
+                0.0
+            };
+            let torque = rad_s_from_rpm(0.1 * rpm_s + 0.001 * speed_rpm) + 0.5 + 0.01 * random.normal();
+            let flags = if cycle == 14_000 { GIB_INERTIA_FINISH } else { 0 };
+            machine.step(&InertiaInput { speed_rpm, torque, flags, ..InertiaInput::default() });
+            speed_rpm += rpm_s * CYCLE;
+        }
+        let (report, verdict) = machine.report().unwrap();
+        assert_eq!(verdict, Ok(()), "{listen_s}");
+        assert!((report.total_kg_m2 - 0.1).abs() < report.total_uncertainty_kg_m2.max(1e-5), "{listen_s} {report:?}");
+        assert!((256..=512).contains(&report.blocks_used), "{report:?}");
+        found.push(report);
+    }
+    assert!(found.iter().all(|report| *report == found[0]), "{found:?}");
+}

@@ -263,6 +263,85 @@ fn bad_inputs_end_at_the_mean_speed() {
     }
 }
 
+/// Follows the commands from a cycle that asks for `input` on until there are `cycles` more that ask for it too: none changes by more
+/// than the motor can at the mean speed, and the feed-forward is what each takes.
+fn without_a_jump(machine: &mut SpeedVariation, input: &SpeedVariationInput, cycles: usize) -> SpeedVariationOutput {
+    for _ in 0..cycles {
+        let before = machine.output().speed_command_rpm;
+        let out = *machine.step(input);
+        let (from, to) = (rad_s_from_rpm(before), rad_s_from_rpm(out.speed_command_rpm));
+        let change = to - from;
+        assert!((0.5 * change / 0.001 * from.abs().max(to.abs())).abs() <= 1e4, "{before} {out:?}");
+        assert!(change.abs() <= 1e4 / rad_s_from_rpm(1000.0) / 0.5 * 0.001, "{before} {out:?}");
+        assert!((out.torque_nm - 0.5 * change / 0.001).abs() < 1e-6, "{before} {out:?}");
+    }
+    *machine.output()
+}
+
+/// An override, a spindle stop, a reversal after a stop or a fault, and a wrong input: the command goes to what is asked for.
+#[test]
+fn what_is_asked_for_on_the_way_back_and_after_it_is_met_without_a_jump() {
+    for waveform in [GIB_SPEED_VARIATION_TRIANGLE, GIB_SPEED_VARIATION_SINE] {
+        for sense in [1.0, -1.0] {
+            for (speed, end) in [(700.0, GIB_DONE), (1300.0, GIB_DONE), (0.0, GIB_DONE), (-1000.0, GIB_DONE)] {
+                for after in [0, 5, 300] {
+                    let config = SpeedVariationConfig { waveform, speed_rpm: sense * 1000.0, ..config() };
+                    let mut machine = started(&config);
+                    machine.step(&asked(sense * 1000.0));
+                    without_a_jump(&mut machine, &asked(sense * 1000.0), 1400);
+                    let stop =
+                        |speed: f64| SpeedVariationInput { flags: GIB_SPEED_VARIATION_STOP, ..asked(sense * speed) };
+                    without_a_jump(&mut machine, &stop(1000.0), after + 1);
+                    let out = without_a_jump(&mut machine, &stop(speed), 1400);
+                    assert_eq!((out.status, out.speed_command_rpm), (end, sense * speed), "{after} {out:?}");
+                    // What is met is passed through; what is no number or too fast is not.
+                    for (input, passed) in
+                        [(500.0, 500.0), (f64::NAN, 500.0), (2.1e5, 500.0), (-1e9, 500.0), (0.0, 0.0)]
+                    {
+                        let out = machine.step(&asked(input));
+                        assert_eq!((out.speed_command_rpm, out.torque_nm), (passed, 0.0));
+                    }
+                }
+            }
+            for speed in [-1000.0, 0.0] {
+                let config =
+                    SpeedVariationConfig { waveform, speed_rpm: sense * 1000.0, speed_min_rpm: 200.0, ..config() };
+                let mut machine = started(&config);
+                machine.step(&asked(sense * 1000.0));
+                without_a_jump(&mut machine, &asked(sense * 1000.0), 1400);
+                let out = without_a_jump(&mut machine, &asked(sense * speed), 2500);
+                assert_eq!((out.status, out.speed_command_rpm), (GIB_ERR_SPEED_VARIATION_SPEED, sense * speed));
+            }
+        }
+    }
+}
+
+/// A drive that has tripped on the way is told at once what is wanted of it.
+#[test]
+fn a_drive_fault_after_the_end_lets_go() {
+    let mut machine = started(&config());
+    machine.step(&asked(1000.0));
+    without_a_jump(&mut machine, &asked(1000.0), 700);
+    without_a_jump(&mut machine, &asked(-1000.0), 1000);
+    assert!(machine.output().status < 0 && machine.output().speed_command_rpm > -900.0);
+    let out = machine.step(&SpeedVariationInput { flags: crate::cycle::backlash::io::GIB_INPUT_FAULT, ..asked(0.0) });
+    assert_eq!((out.speed_command_rpm, out.torque_nm), (0.0, 0.0));
+}
+
+/// A mean speed that never rests on the way back ends in time.
+#[test]
+fn a_mean_speed_that_never_rests_ends_in_time() {
+    let mut machine = started(&config());
+    for cycle in 0..2_000_000 {
+        let flags = if cycle < 1400 { 0 } else { GIB_SPEED_VARIATION_STOP };
+        let speed = if cycle % 2 == 0 || cycle < 1400 { 1000.0 } else { 500.0 };
+        if machine.step(&SpeedVariationInput { flags, ..asked(speed) }).status != GIB_BUSY {
+            break;
+        }
+    }
+    assert_eq!(machine.output().status, GIB_ERR_SPEED_VARIATION_NONE);
+}
+
 /// Torque and power of a cycle in which the speed changes (both rad/s): within those of `config` with that much cutting, less
 /// the trifle of what accelerates that is the speed loop's.
 fn within_the_motor(

@@ -66,7 +66,8 @@ impl SpeedVariationConfig {
 pub struct SpeedVariationLimits {
     /// Largest amplitude for the period given; 0: none, or no period was given.
     pub amplitude_ratio: f64,
-    /// Shortest period for the amplitude given, s; 0: none does, or no amplitude was given.
+    /// Shortest period for the amplitude given that the motor can do, s; 0: none does, or no amplitude was given. It may be
+    /// shorter than a start takes, which is 0.02 s and 8 cycles.
     pub period_s: f64,
     /// Largest amplitude for the period, as published.
     pub published_amplitude_ratio: f64,
@@ -77,7 +78,8 @@ pub struct SpeedVariationLimits {
     /// Recommended amplitude: sweeps the chatter's regeneration through one wave, or 10 % where the chatter's
     /// frequency is not given.
     pub recommended_amplitude_ratio: f64,
-    /// Recommended period: the shortest for it that the motor can do, s; 0: none.
+    /// Recommended period: the shortest for it that the motor can do and a start takes, but not below five revolutions, s;
+    /// 0: none.
     pub recommended_period_s: f64,
     /// Power at the top of the swing of the amplitude and period given, W; 0: not both were given.
     pub power_w: f64,

@@ -11,7 +11,7 @@ pub const GIB_SPEED_VARIATION_DONE: i32 = 3;
 /// Ended with an error; kept until the next start.
 pub const GIB_SPEED_VARIATION_FAILED: i32 = 4;
 
-/// Input flag: end the variation; the speed goes back to its mean, then `GIB_DONE`.
+/// Input flag: end the variation; the speed goes back to its mean as it is asked for by then, then `GIB_DONE`.
 pub const GIB_SPEED_VARIATION_STOP: u32 = 8;
 
 /// What the kernel asks for in a cycle. Values may change in any cycle; a change takes effect within 20 cycles.
@@ -19,7 +19,7 @@ pub const GIB_SPEED_VARIATION_STOP: u32 = 8;
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SpeedVariationInput {
     /// Mean spindle speed, rpm, with override; within the configuration's limits and in its sense, else
-    /// GIB_ERR_SPEED_VARIATION_SPEED ends the variation.
+    /// GIB_ERR_SPEED_VARIATION_SPEED ends the variation. Where nothing is varied: the speed asked for, of either sense, or 0.
     pub speed_rpm: f64,
     /// Amplitude as a share of the mean speed, up to 0.999; 0: as configured.
     pub amplitude_ratio: f64,
@@ -46,7 +46,7 @@ pub struct SpeedVariationOutput {
     pub amplitude_ratio: f64,
     /// Largest amplitude possible at the period, speed and cutting torque in effect.
     pub amplitude_limit_ratio: f64,
-    /// Shortest period possible at the amplitude asked for and the speed and cutting torque in effect, s; 0: none.
+    /// Shortest period that the motor can do at the amplitude asked for and the speed and cutting torque in effect, s; 0: none.
     pub period_limit_s: f64,
     /// What the step returned: `GIB_OK`, `GIB_BUSY`, `GIB_DONE` or the first error.
     pub status: i32,

@@ -72,6 +72,8 @@ pub struct SpeedVariation {
     /// Cycles that it may take, and those left beside the ones granted.
     deadline: u32,
     patience: u32,
+    /// It has ended, and the command is still on its way to the speed asked for.
+    going: bool,
     speed: f64,
     /// Of a triangle: its sense, and how far the motor has left it behind since its last corner.
     rising: bool,
@@ -117,6 +119,7 @@ impl Default for SpeedVariation {
             way: 0.0,
             deadline: 0,
             patience: 0,
+            going: false,
             speed: 0.0,
             rising: true,
             behind: 0.0,
@@ -372,13 +375,6 @@ impl SpeedVariation {
         (self.quiet, self.meanwhile) = (0, self.meanwhile.max(self.quiet));
         if input.flags & GIB_SPEED_VARIATION_STOP != 0 {
             self.set_out();
-        }
-    }
-
-    /// Where nothing is varied the command is the speed asked for, or the last one where that is no number.
-    fn rest(&mut self, input: &SpeedVariationInput) {
-        if input.speed_rpm.is_finite() {
-            self.output.speed_command_rpm = input.speed_rpm;
         }
     }
 

@@ -207,8 +207,11 @@ impl Plan {
         if amplitude > 0.0 && period > 0.0 {
             (limits.torque_nm, limits.power_w) = motor.demand(wave, mean, amplitude, period);
         }
-        (limits.recommended_amplitude_ratio, limits.recommended_period_s) =
-            motor.recommended(wave, mean, self.chatter_hz);
+        let (recommended, shortest) = motor.recommended(wave, mean, self.chatter_hz);
+        limits.recommended_amplitude_ratio = recommended;
+        // What the motor can do may be shorter than what a start takes.
+        let least = PERIODS[0].max(8.0 * self.cycle_s);
+        limits.recommended_period_s = if shortest > 0.0 { shortest.max(least) } else { 0.0 };
         limits
     }
 
@@ -305,6 +308,19 @@ mod tests {
             let wanted = |speed| Plan::new(&config).unwrap().wanted(speed, 0.1, 2.0, 0.0);
             assert!(wanted(low).is_ok() && wanted(high).is_ok(), "{low} {high}");
             assert!(wanted(low * (1.0 - 1e-9)).is_err() && wanted(high * (1.0 + 1e-9)).is_err());
+        }
+    }
+
+    /// A light, fast spindle of which the motor could do more than a start takes.
+    #[test]
+    fn what_is_recommended_can_be_started() {
+        for (cycle_s, speed_rpm) in [(0.001, 2e4), (0.02, 6e3)] {
+            let light = SpeedVariationConfig { cycle_s, speed_rpm, inertia_kg_m2: 1e-4, ..valid() };
+            let limits = Plan::to_start(&SpeedVariationConfig { amplitude_ratio: 0.01, period_s: 1.0, ..light })
+                .unwrap()
+                .limits();
+            let (amplitude_ratio, period_s) = (limits.recommended_amplitude_ratio, limits.recommended_period_s);
+            assert!(Plan::to_start(&SpeedVariationConfig { amplitude_ratio, period_s, ..light }).is_ok(), "{limits:?}");
         }
     }
 

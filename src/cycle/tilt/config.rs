@@ -80,8 +80,8 @@ pub struct TiltConfig {
     /// Length of path at both ends of every pass that does not count, since the tool enters or leaves there, 0 to 1000 mm
     /// (default 0: the weights alone reject it). The tool's diameter is a good choice.
     pub entry_mm: f64,
-    /// Time over which load is averaged before it is turned into depth, 8 cycles to 10 s (default 0.1; longer where the
-    /// time limit needs it, see there).
+    /// Time over which load is averaged before it is turned into depth, 8 cycles to 10 s (default 0.1, or 8 cycles where
+    /// these are longer; longer where the time limit needs it, see there).
     pub block_s: f64,
     /// Longest time in the cut, 1 to 20000 s (default 200). Beyond 2000 blocks, blocks get longer.
     pub time_limit_s: f64,

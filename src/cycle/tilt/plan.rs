@@ -98,7 +98,7 @@ impl Plan {
         c.condition.check()?;
         let direct = whole("signal\0", c.signal, 0.0, 1.0)? == GIB_TILT_DC_LOAD;
         let pairs = if direct { 0 } else { whole("pole_pairs\0", c.pole_pairs, 1.0, 100.0)? };
-        let block_s = in_range("block_s\0", or(c.block_s, 0.1), 8.0 * cycle, 10.0)?;
+        let block_s = in_range("block_s\0", or(c.block_s, (8.0 * cycle).max(0.1)), 8.0 * cycle, 10.0)?;
         let time_limit_s = in_range("time_limit_s\0", or(c.time_limit_s, 200.0), 1.0, 20000.0)?;
         // A margin of blocks: whole periods make them a little longer or shorter.
         let block_cycles = (block_s.max(time_limit_s / (0.97 * BLOCKS as f64)) / cycle).ceil();
@@ -211,6 +211,10 @@ pub(crate) mod tests {
             assert_eq!(Plan::new(&config).unwrap_err().field, field);
         }
         assert!(Plan::new(&TiltConfig { signal: GIB_TILT_DC_LOAD, pole_pairs: 0, ..valid() }).is_ok());
+        for cycle_s in [5e-5, 0.0126, 0.02] {
+            let plan = Plan::new(&TiltConfig { cycle_s, time_limit_s: 1.0, ..valid() }).unwrap();
+            assert_eq!(plan.block_cycles, (0.1 / cycle_s).ceil().max(8.0), "{cycle_s}");
+        }
     }
 
     #[test]

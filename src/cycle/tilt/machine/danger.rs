@@ -29,9 +29,12 @@ pub(super) fn danger(input: &TiltInput) -> Option<Fault> {
     if input.flags & GIB_INPUT_ABORT != 0 {
         return Some(Fault::of(GIB_ERR_ABORTED));
     }
-    if input.flags & !(KNOWN | GIB_INPUT_ABORT) != 0 {
-        let field = if input.flags & GIB_INPUT_FAULT != 0 { "\0" } else { "flags\0" };
-        return Some(Fault { code: GIB_ERR_DRIVE_FAULT, field, value: f64::from(input.flags), ..Fault::NONE });
+    if input.flags & GIB_INPUT_FAULT != 0 {
+        return Some(Fault { code: GIB_ERR_DRIVE_FAULT, value: f64::from(input.flags), ..Fault::NONE });
+    }
+    if input.flags & !KNOWN != 0 {
+        let (value, high) = (f64::from(input.flags), f64::from(KNOWN));
+        return Some(Fault { code: GIB_ERR_CONFIG, field: "flags\0", value, low: 0.0, high });
     }
     if sound(input) {
         return None;
