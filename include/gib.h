@@ -2222,11 +2222,12 @@ typedef struct gib_homing_config {
      */
     double torque_tolerance_nm;
     /**
-     * The axis stands when slower than this, 1e-6 mm/s to the approach speed (default a fifth of the touch speed, 0.05 at least).
+     * The axis stands when slower than this, 1e-6 mm/s to the approach speed (default a fifth of the touch speed, 0.05 at least, no more than
+     * the approach speed).
      */
     double detection_velocity_mm_s;
     /**
-     * Time for which the torque must be limiting and the axis stand, 8 cycles to 5 s (default 0.1).
+     * Time for which the torque must be limiting and the axis stand, 8 cycles to 5 s (default 0.1, 8 cycles at least).
      */
     double detection_time_s;
     /**
@@ -2238,7 +2239,8 @@ typedef struct gib_homing_config {
      */
     double distance_max_mm;
     /**
-     * Time for the whole homing, a cycle to 100000 s (default: what its ways take, twice, and 10 s).
+     * Time for the whole homing, a cycle to 100000 s (default: what its ways take, twice, and 10 s, as far as that is
+     * allowed).
      */
     double time_limit_s;
     /**
@@ -2250,7 +2252,8 @@ typedef struct gib_homing_config {
      */
     double set_position_mm;
     /**
-     * Way from the contact point to that place, away from the stop, 0 (default) to 1000 mm.
+     * Way from the contact point to that place, away from the stop, 0 (default) to 1000 mm. There the axis must come within a tenth of
+     * `press_max_mm` of its command, or without torque within half of its way, in ten detection times, else `GIB_ERR_LAG`.
      */
     double zero_offset_mm;
     /**
@@ -2293,8 +2296,8 @@ typedef struct gib_homing_config {
  */
 typedef struct gib_homing_input {
     /**
-     * Motor position in load units, mm, in the coordinate of the start; from the request to set the position on, either in that or
-     * with `shift_mm` added.
+     * Motor position in load units, mm, in the coordinate of the start; from the request to set the position on, in any cycle either in
+     * that or with `shift_mm` added.
      */
     double position_mm[2];
     /**
@@ -2322,7 +2325,8 @@ typedef struct gib_homing_input {
  */
 typedef struct gib_homing_output {
     /**
-     * Commanded motor positions, mm. To be followed while `owns_motion` is 1.
+     * Commanded motor positions, mm, in the coordinate of the start. To be followed while `owns_motion` is 1, in that coordinate also
+     * when `shift_mm` has been added to the positions told: the axis does not move by being told where it is.
      */
     double target_position_mm[2];
     /**
@@ -2526,7 +2530,7 @@ typedef struct gib_inertia_config {
     double takeup_s;
     /**
      * Longest time to listen, 256 cycles to 3600 s. Required for `GIB_INERTIA_LISTEN`, where `GIB_INERTIA_FINISH` may end it at any
- * moment; not used by `GIB_INERTIA_RAMP`, 0 to 3600 s.
+     * moment; not used by `GIB_INERTIA_RAMP`, 0 to 3600 s.
      */
     double listen_s;
     /**
@@ -2918,7 +2922,7 @@ typedef struct gib_speed_variation_limits {
     double amplitude_ratio;
     /**
      * Shortest period for the amplitude given that the motor can do, s; 0: none does, or no amplitude was given. It may be
- * shorter than a start takes, which is 0.02 s and 8 cycles.
+     * shorter than a start takes, which is 0.02 s and 8 cycles.
      */
     double period_s;
     /**
@@ -2940,7 +2944,7 @@ typedef struct gib_speed_variation_limits {
     double recommended_amplitude_ratio;
     /**
      * Recommended period: the shortest for it that the motor can do and a start takes, but not below five revolutions, s;
- * 0: none.
+     * 0: none.
      */
     double recommended_period_s;
     /**
@@ -5056,7 +5060,7 @@ const struct gib_api_table *gib_api(uint32_t version);
 /**
  * Bytes that an instance needs in memory of your own, to be aligned to 16.
  *
- * @return the size in bytes, about 67 KiB.
+ * @return the size in bytes, about 78 KiB.
  *
  * [thread: any] [real-time: yes] [state: any]
  */

@@ -117,7 +117,7 @@ impl Plan {
             plan.listen_cycles = cycles(in_range("listen_s\0", c.listen_s, shortest, 3600.0)?);
             // The steps of a counted speed are as large as what a few samples change by: sixteen calm them, where that leaves 128
             // blocks. In a long time they get longer as they come: it may end early.
-            plan.block = (plan.listen_cycles / 128).min(16).max(4);
+            plan.block = (plan.listen_cycles / 128).clamp(4, 16);
         } else {
             in_range("listen_s\0", c.listen_s, 0.0, 3600.0)?;
             plan.add_ramps(c, takeup)?;
