@@ -22,6 +22,7 @@ use crate::machine::Cause;
 use once_cell::sync::OnceCell;
 use std::collections::{HashMap, HashSet};
 
+mod leaning;
 mod noise;
 mod shelf;
 mod starts;
@@ -422,7 +423,8 @@ pub fn refined(bench: &Bench, set: &Fit, part: Part, squares: f64) -> Fit {
     let mut parts = set.parts.clone();
     parts.push(part);
     let count = set.parts.len();
-    let fit = bench.refine_towards(bench.fit(parts), count, 6, squares);
+    let fit = leaning::table_anew(bench, bench.fit(parts));
+    let fit = bench.refine_towards(fit, count, 6, squares);
     if fit.squares() > FAR_OFF * squares {
         return fit;
     }
