@@ -18,6 +18,8 @@ pub const PAIRS: usize = 8;
 pub const FLUSH: f32 = 1e-10;
 /// A deviation beyond this many standard deviations counts as this many: a blow on the machine is not its vibration.
 const CLIP: f32 = 5.0;
+/// Of the variance of the first revolution, what is left at least: of few readings its harmonics explain more than there is.
+const LEFT: f32 = 0.01;
 /// Smallest variance.
 const FLOOR: f32 = 1e-12;
 
@@ -123,10 +125,16 @@ impl Trackers {
         }
     }
 
-    /// The first revolution is whole. Of what it leaves nothing is known yet: no more than all of it may be noise.
+    /// The first revolution is whole. What its harmonics leave of it is noise, and some of them may be.
     pub fn known(&mut self) {
-        let variance = core::array::from_fn(|n| (self.square[n] - self.mean[n] * self.mean[n]) as f32);
-        self.set_variance(variance);
+        let variance = |n: usize| {
+            let all = (self.square[n] - self.mean[n] * self.mean[n]) as f32;
+            let power = self.harmonics[n].0.iter().fold(Lanes::ZERO, |sum, pair| sum + *pair * *pair);
+            let [a, b, c, d] = power.to_array();
+            let left = all - 0.5 * ((a + b) + (c + d));
+            if left > LEFT * all { left } else { LEFT * all }
+        };
+        self.set_variance([variance(0), variance(1)]);
         for n in 0..2 {
             self.offset[n] += self.mean[n];
             (self.mean[n], self.square[n]) = (0.0, 0.0);

@@ -38,6 +38,8 @@ pub struct Plan {
     pub acceleration_max: f64x2,
     /// Largest plausible displacement, µm.
     pub displacement_max: f64,
+    /// By how much the largest correction fades in a cycle, µm.
+    pub displacement_step: f32,
     /// Rates of harmonics between which an acceleration is worth a displacement.
     pub tracked: [f32; 2],
     /// Change of the blend in a cycle.
@@ -72,6 +74,7 @@ impl Plan {
         saturation: 0.0,
         acceleration_max: f64x2::ZERO,
         displacement_max: 0.0,
+        displacement_step: 0.0,
         tracked: [1.0, 0.0],
         fade: 1.0,
         share_min: 0.0,
@@ -104,6 +107,8 @@ impl Plan {
         let averaging = in_range("averaging_revolutions\0", or(c.averaging_revolutions, 16.0), 1.0, 1000.0)?;
         let fade = in_range("fade_s\0", or(c.fade_s, 0.1), 0.001, 10.0)?;
         let filter = in_range("speed_filter_s\0", or(c.speed_filter_s, cycle.max(0.02)), cycle, 1.0)?;
+        let fade = (cycle / fade).min(1.0);
+        let displacement_max = in_range("displacement_max_um\0", or(c.displacement_max_um, 100.0), 0.1, 1e4)?;
         let mut plan = Plan {
             integrate: whole("method\0", c.method, 0.0, 1.0)? != 0.0,
             second_slide: whole("second_slide\0", c.second_slide, 0.0, 1.0)? != 0.0,
@@ -119,9 +124,10 @@ impl Plan {
             acceleration_max: f64x2::splat(
                 in_range("acceleration_max_m_s2\0", plausible, 1e-3, range)?.min(0.998 * range),
             ),
-            displacement_max: in_range("displacement_max_um\0", or(c.displacement_max_um, 100.0), 0.1, 1e4)?,
+            displacement_max,
+            displacement_step: (2.0 * displacement_max * fade) as f32,
             tracked: [(low * cycle) as f32, NYQUIST as f32],
-            fade: (cycle / fade).min(1.0),
+            fade,
             share_min: (1.0 / averaging) as f32,
             share_max: (1.0 / (2.0 * harmonics + 2.0)) as f32,
             to_um: (-1e6 * (cycle / core::f64::consts::TAU).powi(2)) as f32,

@@ -7,15 +7,12 @@ use super::*;
 use crate::cycle::lanes::within;
 use wide::f64x2;
 
-/// Turns after which the variance has forgotten the first one, all of which it took for noise.
-const SURE: f64 = 10.0;
-
 impl Vibration {
     /// Says whether the next cycle can be a usual one.
     pub(super) fn see_usual(&mut self) {
         let calm =
             self.trackers.surprise == [0.0; 2] && self.sensors.live() && self.spindle.calm() && self.leaving == 0.0;
-        let known = self.revolution == f64::INFINITY && self.progress > SURE;
+        let known = self.revolution == f64::INFINITY && self.progress > 3.0;
         let simple = !self.plan.integrate && !self.plan.second_slide;
         let full = self.phase == Phase::Running && self.blend == 1.0;
         self.usual = if calm && known && simple && full { self.plan.pairs } else { 0 };

@@ -81,21 +81,20 @@ impl Vibration {
         if self.stale(pair) {
             self.find_factors(pair);
         }
-        let before = self.displacement.map(|harmonics| harmonics.0[pair]);
+        let before = [self.displacement[0].0[pair], self.displacement[1].0[pair]];
         self.look_at(GIB_VIBRATION_SEAT, pair);
         self.believe(GIB_VIBRATION_SEAT, pair);
         self.look_at(GIB_VIBRATION_BEARING, pair);
         self.believe(GIB_VIBRATION_BEARING, pair);
         self.keep_average();
         // While little of it is put out it may come at once.
-        let most = 2.0 * self.plan.displacement_max * self.plan.fade;
-        let most = most as f32 / (self.blend as f32).max(self.plan.fade as f32);
+        let most = self.plan.displacement_step / (self.blend + self.plan.fade) as f32;
         for (harmonics, before) in self.displacement.iter_mut().zip(before) {
             let change = harmonics.0[pair] - before;
             let [a, b, c, d] = (change * change).to_array();
-            let size = ((a + b) + (c + d)).sqrt();
-            if size > most {
-                harmonics.0[pair] = before + change * Lanes::splat(most / size);
+            let square = (a + b) + (c + d);
+            if square > most * most {
+                harmonics.0[pair] = before + change * Lanes::splat(most / square.sqrt());
             }
         }
     }
