@@ -12,6 +12,8 @@ use wide::f64x2;
 const SWING: f32 = 1.5;
 /// Part of a displacement's news that is shown at once.
 const AT_ONCE: f32 = 0.8;
+/// How many times as much of the largest correction's fade may be shown at once in usual cycles, in few of which anything is.
+const SELDOM: f32 = 2.0;
 
 /// Relative change of speed in a revolution up to which displacements change slowly.
 const STEADY: f64 = 1e-3;
@@ -81,22 +83,13 @@ impl Vibration {
         if self.stale(pair) {
             self.find_factors(pair);
         }
-        let before = [self.displacement[0].0[pair], self.displacement[1].0[pair]];
-        self.look_at(GIB_VIBRATION_SEAT, pair);
-        self.believe(GIB_VIBRATION_SEAT, pair);
-        self.look_at(GIB_VIBRATION_BEARING, pair);
-        self.believe(GIB_VIBRATION_BEARING, pair);
-        self.keep_average();
         // While little of it is put out it may come at once.
         let most = self.plan.displacement_step / (self.blend + self.plan.fade) as f32;
-        for (harmonics, before) in self.displacement.iter_mut().zip(before) {
-            let change = harmonics.0[pair] - before;
-            let [a, b, c, d] = (change * change).to_array();
-            let square = (a + b) + (c + d);
-            if square > most * most {
-                harmonics.0[pair] = before + change * Lanes::splat(most / square.sqrt());
-            }
-        }
+        self.look_at(GIB_VIBRATION_SEAT, pair);
+        self.believe(GIB_VIBRATION_SEAT, pair, most);
+        self.look_at(GIB_VIBRATION_BEARING, pair);
+        self.believe(GIB_VIBRATION_BEARING, pair, most);
+        self.keep_average();
     }
 
     /// One cycle of some looks whether the sensors live, and renews a slice of a pair.
@@ -114,10 +107,10 @@ impl Vibration {
         let pair = self.due::<N>(slice >> 2);
         match slice & 3 {
             0 => self.look_at(GIB_VIBRATION_SEAT, pair),
-            1 => self.believe(GIB_VIBRATION_SEAT, pair),
+            1 => self.believe(GIB_VIBRATION_SEAT, pair, SELDOM * self.plan.displacement_step),
             2 => self.look_at(GIB_VIBRATION_BEARING, pair),
             _ => {
-                self.believe(GIB_VIBRATION_BEARING, pair);
+                self.believe(GIB_VIBRATION_BEARING, pair, SELDOM * self.plan.displacement_step);
                 self.keep_average();
                 self.renewal.compare(pair, self.known[0][pair].strength() + self.known[1][pair].strength());
                 let next = self.due::<N>((slice >> 2).wrapping_add(1));
@@ -216,16 +209,20 @@ impl Vibration {
     }
 
     /// How much of them is believed, and how fast they are followed from now on. Not shown at once, so that the correction
-    /// does not jump where they change fast.
+    /// does not jump where they change fast, nor more than by `most`, µm.
     #[inline(always)]
-    fn believe(&mut self, n: usize, pair: usize) {
+    fn believe(&mut self, n: usize, pair: usize, most: f32) {
         let now = &self.renewal.factors[pair];
         let (noise, used, kept) = (now.noise, now.used, now.kept);
         let variance = self.trackers.variance()[n];
         let (share, known) = (&mut self.trackers.shares[n][pair], &mut self.known[n][pair]);
         let noise = noise * Lanes::splat(variance);
         let (now, shown) = (known.believed(noise * *share) * used, &mut self.displacement[n].0[pair]);
-        *shown = flushed(*shown + Lanes::splat(AT_ONCE) * (now - *shown), FLUSH);
+        let change = Lanes::splat(AT_ONCE) * (now - *shown);
+        let [a, b, c, d] = (change * change).to_array();
+        let square = (a + b) + (c + d);
+        let part = if square > most * most { most / square.sqrt() } else { 1.0 };
+        *shown = flushed(*shown + Lanes::splat(part) * change, FLUSH);
         let drift = SWING * self.swing.abs() as f32;
         // What is left out learns nothing: it would take from a harmonic that looks the same in the samples.
         *share = (*share + (known.share(drift, noise, self.part) - *share) * used) * kept;
