@@ -182,6 +182,7 @@ static void full_seat(gib_vibration_input *in, uint64_t c) { (void)c; in->accele
 static void full_head(gib_vibration_input *in, uint64_t c) { (void)c; in->acceleration_m_s2[1] = -20.0; }
 static void aborted(gib_vibration_input *in, uint64_t c) { (void)c; in->flags = GIB_INPUT_ABORT; }
 static void tripped(gib_vibration_input *in, uint64_t c) { (void)c; in->flags = GIB_INPUT_FAULT; }
+static void flagged_strangely(gib_vibration_input *in, uint64_t c) { (void)c; in->flags = 1u << 7; }
 
 static const struct {
     spoil spoilt;
@@ -202,6 +203,7 @@ static const struct {
     {full_head, GIB_VIBRATION_SATURATED << 8, GIB_ERR_VIBRATION_SATURATED, 0},
     {aborted, 0, GIB_ERR_ABORTED, GIB_ERR_ABORTED},
     {tripped, 0, GIB_ERR_DRIVE_FAULT, GIB_ERR_DRIVE_FAULT},
+    {flagged_strangely, 0, GIB_ERR_CONFIG, GIB_ERR_CONFIG},
 };
 enum { FAULT_COUNT = sizeof FAULTS / sizeof *FAULTS };
 

@@ -1001,7 +1001,7 @@
 #define GIB_LEARNING_SPEED_CHANGED 8
 
 /**
- * Reason: the correction is at its bound.
+ * No step gives this reason: of a correction at its bound `correction_um` of the report is `correction_max_um`.
  */
 #define GIB_LEARNING_LIMITED 16
 
@@ -3140,7 +3140,7 @@ typedef struct gib_vibration_input {
      */
     double acceleration_m_s2[2];
     /**
-     * `GIB_INPUT_ABORT`, `GIB_INPUT_FAULT`; other bits must be 0. Both fade the correction out.
+     * `GIB_INPUT_ABORT`, `GIB_INPUT_FAULT`; other bits must be 0, else `GIB_ERR_CONFIG`. All fade the correction out.
      */
     uint32_t flags;
     /**
@@ -4588,9 +4588,6 @@ int32_t gib_backlash_start(struct gib_backlash *handle,
  * A fault is named in `message` in the cycle in which it is found. In that cycle the command already brakes from its own last
  * speed, no harder than `acceleration_mm_s2`, whatever is measured; with GIB_INPUT_FAULT, when the axis follows no command, it stays
  * where it is. Then everything changed is restored; while that goes on the status is GIB_BUSY, and only then the error.
- *
- * A call without input or output does nothing but say so: the command stands where it was, at speed 0, time stands still for the
- * measurement, and the next whole call goes on from there. After more than a few such cycles abort.
  *
  * @param handle the instance.
  * @param input measured values of this cycle.
@@ -6424,7 +6421,7 @@ int32_t gib_vibration_start(struct gib_vibration *handle,
  * @param input measured values of this cycle, all of the same instant.
  * @param output the position; always written when not NULL.
  * @return GIB_OK when idle, GIB_BUSY, or the first error, which is kept until the next start: GIB_ERR_ABORTED,
- * GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE when the scale is no number (the last position is repeated in such a cycle, and the correction fades);
+ * GIB_ERR_DRIVE_FAULT, GIB_ERR_CONFIG (unknown `flags`), GIB_ERR_NON_FINITE when the scale is no number (the last position is repeated in such a cycle, and the correction fades);
  * and GIB_ERR_NULL, GIB_ERR_HANDLE of this call. Where `input` is NULL the last position is repeated, and `correction_um` is what is
  * in it.
  *

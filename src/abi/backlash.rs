@@ -139,9 +139,6 @@ pub unsafe extern "C" fn gib_backlash_start(handle: *mut GibBacklash, config: *c
 /// speed, no harder than `acceleration_mm_s2`, whatever is measured; with GIB_INPUT_FAULT, when the axis follows no command, it stays
 /// where it is. Then everything changed is restored; while that goes on the status is GIB_BUSY, and only then the error.
 ///
-/// A call without input or output does nothing but say so: the command stands where it was, at speed 0, time stands still for the
-/// measurement, and the next whole call goes on from there. After more than a few such cycles abort.
-///
 /// @param handle the instance.
 /// @param input measured values of this cycle.
 /// @param output commands for this cycle; always written when not NULL.

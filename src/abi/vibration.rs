@@ -128,7 +128,7 @@ pub unsafe extern "C" fn gib_vibration_start(
 /// @param input measured values of this cycle, all of the same instant.
 /// @param output the position; always written when not NULL.
 /// @return GIB_OK when idle, GIB_BUSY, or the first error, which is kept until the next start: GIB_ERR_ABORTED,
-/// GIB_ERR_DRIVE_FAULT, GIB_ERR_NON_FINITE when the scale is no number (the last position is repeated in such a cycle, and the correction fades);
+/// GIB_ERR_DRIVE_FAULT, GIB_ERR_CONFIG (unknown `flags`), GIB_ERR_NON_FINITE when the scale is no number (the last position is repeated in such a cycle, and the correction fades);
 /// and GIB_ERR_NULL, GIB_ERR_HANDLE of this call. Where `input` is NULL the last position is repeated, and `correction_um` is what is
 /// in it.
 ///

@@ -1,6 +1,6 @@
 //! What crosses the boundary in every servo cycle. These structs are frozen for an ABI major.
 
-use crate::error::{Fault, GIB_ERR_CONFIG};
+use crate::error::{Fault, GIB_ERR_ABORTED, GIB_ERR_CONFIG, GIB_ERR_DRIVE_FAULT};
 
 /// The axis stands; gib asks for nothing.
 pub const GIB_BACKLASH_IDLE: i32 = 0;
@@ -36,9 +36,16 @@ pub const GIB_INPUT_FAULT: u32 = 1;
 /// Input flag: abort, as `gib_backlash_abort` does.
 pub const GIB_INPUT_ABORT: u32 = 2;
 
-/// The fault of flags that say neither: they mean something that this library does not know.
+/// The fault that flags tell where there are any. What says neither means something that this library does not know.
+#[cold]
 #[must_use]
-pub fn unknown_flags(flags: u32) -> Fault {
+pub fn flagged(flags: u32) -> Fault {
+    if flags & GIB_INPUT_ABORT != 0 {
+        return Fault::of(GIB_ERR_ABORTED);
+    }
+    if flags & GIB_INPUT_FAULT != 0 {
+        return Fault::of(GIB_ERR_DRIVE_FAULT);
+    }
     let (value, high) = (f64::from(flags), f64::from(GIB_INPUT_FAULT | GIB_INPUT_ABORT));
     Fault { code: GIB_ERR_CONFIG, field: "flags\0", value, low: 0.0, high }
 }

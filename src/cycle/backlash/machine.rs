@@ -394,14 +394,8 @@ impl Backlash {
         let plan = &self.plan;
         let fault = |code, field, value, low, high| Some(Fault { code, field, value, low, high });
         let finite = |field, value: f64| fault(GIB_ERR_NON_FINITE, field, value, f64::MIN, f64::MAX);
-        if input.flags & GIB_INPUT_ABORT != 0 {
-            return Some(Fault::of(GIB_ERR_ABORTED));
-        }
-        if input.flags & GIB_INPUT_FAULT != 0 {
-            return Some(Fault::of(GIB_ERR_DRIVE_FAULT));
-        }
         if input.flags != 0 {
-            return Some(unknown_flags(input.flags));
+            return Some(flagged(input.flags));
         }
         if !input.position_mm.is_finite() {
             return finite("position_mm\0", input.position_mm);

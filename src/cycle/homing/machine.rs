@@ -14,7 +14,7 @@ use super::io::*;
 use super::plan::Plan;
 use super::side::{Side, Touch};
 use super::verdict::{HomingReport, HomingSide, Touches};
-use crate::cycle::backlash::io::{GIB_INPUT_ABORT, GIB_INPUT_FAULT, unknown_flags};
+use crate::cycle::backlash::io::{GIB_INPUT_ABORT, flagged};
 use crate::error::*;
 
 mod gantry;
@@ -373,14 +373,8 @@ impl Homing {
 
     #[cold]
     fn name_danger(&self, input: &HomingInput) -> Option<Fault> {
-        if input.flags & GIB_INPUT_ABORT != 0 {
-            return Some(Fault::of(GIB_ERR_ABORTED));
-        }
-        if input.flags & GIB_INPUT_FAULT != 0 {
-            return Some(Fault::of(GIB_ERR_DRIVE_FAULT));
-        }
         if input.flags != 0 {
-            return Some(unknown_flags(input.flags));
+            return Some(flagged(input.flags));
         }
         for (i, side) in self.sides.iter().enumerate().take(self.plan.motors) {
             let (position, torque) = (input.position_mm[i], input.torque[i]);

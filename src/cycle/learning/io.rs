@@ -30,7 +30,7 @@ pub const GIB_LEARNING_NOT_DETECTED: u32 = 4;
 /// `speed_tolerance_ratio` over eight times `revolutions`: what is left is more than it was. By more than half of that speed, or
 /// the other way round, it would do harm, and is out until the speed is back.
 pub const GIB_LEARNING_SPEED_CHANGED: u32 = 8;
-/// Reason: the correction is at its bound.
+/// No step gives this reason: of a correction at its bound `correction_um` of the report is `correction_max_um`.
 pub const GIB_LEARNING_LIMITED: u32 = 16;
 
 /// What the kernel tells gib in a cycle, all of the same instant.

@@ -21,6 +21,7 @@ use super::io::*;
 use super::lines::Line;
 use super::plan::Plan;
 use super::points::{Bin, Cell, ENTRIES, Place, Table, Weight};
+use crate::cycle::backlash::io::flagged;
 use crate::cycle::turns::{fold, folded};
 use crate::cycle::vibration::harmonic::Harmonics;
 use crate::error::*;
@@ -293,7 +294,7 @@ impl Learning {
             return;
         }
         if input.flags != 0 && self.phase != Phase::Stopping {
-            self.leave(out::flagged(input.flags));
+            self.leave(flagged(input.flags));
         }
         let turned = self.turn(input.angle_deg);
         let left = input.target_mm - input.detected_mm;

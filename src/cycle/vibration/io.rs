@@ -47,7 +47,7 @@ pub struct VibrationInput {
     pub angle_deg: f64,
     /// Acceleration of seat and bearing, m/s², positive as the scale is.
     pub acceleration_m_s2: [f64; 2],
-    /// `GIB_INPUT_ABORT`, `GIB_INPUT_FAULT`; other bits must be 0. Both fade the correction out.
+    /// `GIB_INPUT_ABORT`, `GIB_INPUT_FAULT`; other bits must be 0, else `GIB_ERR_CONFIG`. All fade the correction out.
     pub flags: u32,
     /// Zero.
     pub reserved: u32,

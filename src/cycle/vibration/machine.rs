@@ -22,7 +22,7 @@ use super::known::Known;
 use super::plan::Plan;
 use super::sensor::Sensors;
 use super::spindle::{Spindle, Wheel};
-use crate::cycle::backlash::io::GIB_INPUT_ABORT;
+use crate::cycle::backlash::io::flagged;
 use crate::error::*;
 use renew::Renewal;
 
@@ -390,8 +390,7 @@ impl Vibration {
     #[cold]
     fn flagged(&mut self, flags: u32) {
         if self.phase == Phase::Running {
-            let aborted = flags & GIB_INPUT_ABORT != 0;
-            self.leave(Fault::of(if aborted { GIB_ERR_ABORTED } else { GIB_ERR_DRIVE_FAULT }));
+            self.leave(flagged(flags));
         }
     }
 

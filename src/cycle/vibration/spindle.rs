@@ -82,7 +82,7 @@ impl Spindle {
     }
 
     /// Whether this turn alone would take more than half off the rate of a spindle that turns: none does. It is what is left of whole turns
-    /// where cycles are missing.
+    /// where cycles are missing. A filter of few cycles follows a single turn, so that only one the other way round is told.
     #[inline(always)]
     fn turns_back(&self, plan: &Plan, turned: f64) -> bool {
         let rate = self.rate.abs();

@@ -1,7 +1,7 @@
 //! What in a cycle's input must end a calibration, and what leaves the axis beyond command.
 
 use super::{Calibration, Phase};
-use crate::cycle::backlash::io::{GIB_INPUT_ABORT, GIB_INPUT_FAULT, unknown_flags};
+use crate::cycle::backlash::io::flagged;
 use crate::cycle::calibration::io::CalibrationInput;
 use crate::error::*;
 
@@ -41,14 +41,8 @@ impl Calibration {
 
     #[cold]
     fn name_danger(&self, input: &CalibrationInput) -> Option<Fault> {
-        if input.flags & GIB_INPUT_ABORT != 0 {
-            return Some(Fault::of(GIB_ERR_ABORTED));
-        }
-        if input.flags & GIB_INPUT_FAULT != 0 {
-            return Some(Fault::of(GIB_ERR_DRIVE_FAULT));
-        }
         if input.flags != 0 {
-            return Some(unknown_flags(input.flags));
+            return Some(flagged(input.flags));
         }
         let [a1, a2] = input.acceleration_m_s2;
         let off = input.position_mm - self.start;

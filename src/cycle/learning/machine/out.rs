@@ -1,7 +1,6 @@
-//! What ends learning from without, and its last cycles.
+//! The last cycles of learning.
 
 use super::*;
-use crate::cycle::backlash::io::{GIB_INPUT_ABORT, GIB_INPUT_FAULT, unknown_flags};
 
 impl Learning {
     /// A cycle of fading out without a target to put it on.
@@ -28,17 +27,5 @@ impl Learning {
             self.leave(Fault { code: GIB_ERR_NON_FINITE, field: "target_mm\0", value, low, high });
         }
         self.fade_out();
-    }
-}
-
-/// The fault that an input's flags tell.
-#[cold]
-pub fn flagged(flags: u32) -> Fault {
-    if flags & GIB_INPUT_ABORT != 0 {
-        Fault::of(GIB_ERR_ABORTED)
-    } else if flags & GIB_INPUT_FAULT != 0 {
-        Fault::of(GIB_ERR_DRIVE_FAULT)
-    } else {
-        unknown_flags(flags)
     }
 }
