@@ -41,6 +41,8 @@ pub struct Spindle {
     pub bounds: f64x2,
     /// Angles read so far, up to 2: the first two give the speed to start from.
     known: u32,
+    /// The last turn was one back, and not believed.
+    doubted: bool,
 }
 
 /// What a usual cycle reads.
@@ -63,7 +65,9 @@ impl Spindle {
         let angle = fold(angle_deg * (1.0 / 360.0));
         // 0 in the first cycle, and no number where the angle is none.
         let turned = if self.known > 0 { fold(angle - self.angle) } else { 0.0 * angle };
-        let good = turned.abs() <= plan.turn_max && !self.turns_back(plan, turned);
+        // Twice in a row it is the rate that is wrong, as after an angle that was.
+        self.doubted = !self.doubted && self.turns_back(plan, turned);
+        let good = turned.abs() <= plan.turn_max && !self.doubted;
         if good {
             self.angle = angle;
             self.turned = turned;
@@ -260,5 +264,25 @@ mod tests {
                 assert!(error < 1e-5, "harmonic {} at {i}: {error:e}", k + 1);
             }
         }
+    }
+
+    /// After an angle that ran the wrong way the rate is wrong, and the turns that are right look like turns back.
+    #[test]
+    fn a_rate_that_is_wrong_does_not_keep_the_angle_out() {
+        let config = crate::cycle::vibration::config::VibrationConfig {
+            struct_size: 104,
+            cycle_s: 0.001,
+            acceleration_range_m_s2: 50.0,
+            speed_filter_s: 0.001,
+            ..Default::default()
+        };
+        let plan = Plan::new(&config, None).unwrap();
+        let (mut spindle, mut angle_deg, mut bad) = (Spindle::default(), 0.0, 0);
+        for cycle in 0..200 {
+            angle_deg += if (100..115).contains(&cycle) { -6.5 } else { 6.0 };
+            bad += u32::from(!spindle.read(&plan, angle_deg));
+        }
+        assert!(bad <= 4, "{bad} cycles");
+        assert!((spindle.rate - 6.0 / 360.0).abs() < 1e-6, "{}", spindle.rate);
     }
 }
