@@ -309,25 +309,34 @@ static int32_t cycle(variation_adversary *a)
     return a->out.status;
 }
 
+/* A way back: the mean speed and how far from it the command was when it began, and the fastest that it has been since. */
+typedef struct {
+    double mean_rpm, begun_rpm, fastest_rpm;
+} way_back;
+
 /*
- * Cycles that a way back from speed_rpm may take under the load of this cycle: twice what it takes the motor, by what it has left at the
- * fastest, or at a tenth of the mean in a second where it has more; and a second. INFINITY where it has nothing left.
+ * Cycles that a way back may take under the load of this cycle: twice what it takes the motor, by what it has left at the fastest, or at
+ * a tenth of the mean in a second where it has more; and a second. One that has nothing left has the time of one that has more; then,
+ * and where the time is cut short, *cannot is set.
  */
-static double time_for_the_way(const variation_adversary *a, double speed_rpm)
+static double time_for_the_way(const variation_adversary *a, const way_back *w, int *cannot)
 {
     const gib_speed_variation_config *g = &a->config;
-    double mean = spindle_rad_s(fabs(a->mean_rpm)), from = spindle_rad_s(speed_rpm), fastest = fmax(mean, from), keep = 1.0 - g->reserve_ratio;
-    double used = g->coulomb_nm + fmax(g->cutting_nm, a->true_cutting_nm);
+    double mean = spindle_rad_s(fabs(a->mean_rpm)), from = spindle_rad_s(w->fastest_rpm), fastest = fmax(mean, from);
+    double used = g->coulomb_nm + fmax(g->cutting_nm, a->true_cutting_nm), keep = 1.0 - g->reserve_ratio;
     double most = keep * fmin(given(g->torque_nm, INFINITY), g->power_w / fastest), left = most - used - g->viscous_nm_s * fastest;
-    double has = mean > from ? left : left + used + g->coulomb_nm, pace = 0.1 * mean, way = spindle_rad_s(a->way_rpm);
-    has = a->way_rpm > 0.0 ? left : has;
+    double pace = 0.1 * spindle_rad_s(w->mean_rpm), way = spindle_rad_s(w->begun_rpm + a->way_rpm);
     if (g->formula == GIB_SPEED_VARIATION_EXACT) {
-        if (has <= 0.0) {
-            return INFINITY;
-        }
-        pace = fmin(pace, 0.9955 * has / (g->inertia_kg_m2 + g->own_inertia_kg_m2));
+        /* Where the mean moves, the way may go up and down; friction helps to brake. */
+        int up = mean > from || a->way_rpm > 0.0, down = mean <= from || a->way_rpm > 0.0;
+        double per_nm = 0.9955 / (g->inertia_kg_m2 + g->own_inertia_kg_m2);
+        double has[2] = {per_nm * left, per_nm * (left + used + g->coulomb_nm)};
+        *cannot |= (up && has[0] <= 0.0) || (down && has[1] <= 0.0);
+        pace = up && has[0] > 0.0 ? fmin(pace, has[0]) : pace;
+        pace = down && has[1] > 0.0 ? fmin(pace, has[1]) : pace;
     }
-    return (fmin(2.0 * (fabs(mean - from) + way) / pace, 600.0) + 1.0) / g->cycle_s + 3.0;
+    *cannot |= 2.0 * way / pace + 1.0 > 600.0;
+    return (fmin(2.0 * way / pace, 600.0) + 1.0) / g->cycle_s + 3.0;
 }
 
 static void start(variation_adversary *a, int run)
@@ -380,26 +389,26 @@ static void vary(variation_adversary *a, int run)
     a->high_rpm = 0.0;
     a->low_rpm = INFINITY;
     int32_t status = GIB_BUSY;
-    double patience = 0.0, from = 0.0, stood = fabs(g->speed_rpm);
+    double patience = 0.0, stood = fabs(g->speed_rpm);
+    way_back w = {0};
     int cannot = 0;
     while (status == GIB_BUSY && !a->base.broken) {
         int was_named = a->named;
+        double mean = fabs(a->mean_rpm);
         status = cycle(a);
         double speed = fabs(a->out.speed_command_rpm);
         if (a->base.cycle > last && a->out.phase == GIB_SPEED_VARIATION_RUNNING) {
             a->high_rpm = fmax(a->high_rpm, speed);
             a->low_rpm = fmin(a->low_rpm, speed);
         }
-        /* A motor that cannot has the time of one that can at a tenth of the mean speed in a second. */
         if (a->named && !was_named) {
-            from = stood;
-            patience = (fmin(20.0 * fabs(speed / fabs(a->mean_rpm) - 1.0), 600.0) + 1.0) / g->cycle_s + 3.0;
+            /* What is asked for in this very cycle may count already, or not yet. */
+            double now_rpm = fabs(a->mean_rpm);
+            w = (way_back){fmin(mean, now_rpm), fmax(fabs(stood - mean), fabs(stood - now_rpm)), stood};
         }
-        from = a->named && a->way_rpm > 0.0 ? fmax(from, speed) : from;
         if (a->named) {
-            double time = time_for_the_way(a, from);
-            cannot = cannot || isinf(time) || time * g->cycle_s > 600.0;
-            patience = isinf(time) ? patience : fmax(patience, time);
+            w.fastest_rpm = a->way_rpm > 0.0 ? fmax(w.fastest_rpm, speed) : w.fastest_rpm;
+            patience = fmax(patience, time_for_the_way(a, &w, &cannot));
         }
         stood = speed;
         law(&a->base, a->named == 0 || status != GIB_BUSY || a->base.cycle - a->named <= patience, "an end in time");
