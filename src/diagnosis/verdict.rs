@@ -5,7 +5,6 @@
 use super::belief;
 use super::by_loop::{self, Replays};
 use super::causes::{LAWS, Law, law, loose_spring};
-use super::creep;
 use super::excerpt::Excerpt;
 use super::experiment;
 use super::fit::{Bench, Fit};
@@ -15,16 +14,17 @@ use super::holdout::Holdout;
 use super::judge::{Judge, Judged, misleads, refutation, refuted, shows};
 use super::known::Known;
 use super::left::{Left, Unexplained, unexplained};
+use super::looks;
 use super::low_limit;
 use super::narrow::{self, Band};
 use super::progress::{Progress, Stopped, Watch, on_all_cores};
-use super::quiet;
 use super::reopened;
 use super::replayed;
 use super::rivals;
 use super::select::{Search, Selection};
 use super::show::{self, View};
 use super::suffices::what_is_missing;
+use super::twin;
 use super::uncertainty::{self, Sure};
 use super::whole::Whole;
 use crate::analysis::statistics;
@@ -130,55 +130,25 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
         columns = columns.without_repeated_scale();
     }
     let base = belief::base_alone(axis);
-    let without_swings = |frame| masses.iter().fold(frame, Frame::after_first_swings);
-    let first = without_swings(Frame::new(&base, &columns, None));
+    let first = masses.iter().fold(Frame::new(&base, &columns, None), Frame::after_first_swings);
     let missing = what_is_missing(&first);
     if !missing.is_empty() {
         return Ok(Diagnosis { notes, ..insufficient(axis, missing) });
     }
     watch.at(0.05, "reading the motion")?;
     let whole = &Whole::new(axis, whole);
-    let recorded = Recorded { axis, belief: axis, whole, holdout, watch };
-    let mut found = answer(&recorded, &first, notes.clone())?;
-    // Between a motor that winds up its drive and one that drags bristles these rows do not tell.
-    const YIELDING: [Cause; 3] = [Cause::PreslidingFriction, Cause::DriveCompliance, Cause::Backlash];
-    let told = found.findings.iter().any(|finding| YIELDING.contains(&finding.effect.cause()));
-    let yields = !told && belief::may_be_found(axis, Cause::PreslidingFriction);
-    let look_wider = |frame: &Frame| without_swings(Frame::new(&base, &columns, Some(quiet::wider(frame))));
-    let (way, mut wider) = rayon::join(
-        || yields.then(|| creep::way(&first)).flatten(),
-        || quiet::may_hide_more(&found).then(|| look_wider(&first)),
-    );
-    if let Some(way) = way {
-        let frame = without_swings(Frame::yielding_over(&base, &columns, None, way));
-        if creep::promises(&frame, way, &found) {
-            let again = answer(&recorded, &frame, notes.clone())?;
-            if creep::is_over(way, again.findings.iter().map(|finding| finding.effect)) {
-                return watch.at(1.0, "done").map(|()| again);
-            }
-        }
+    let recorded = Recorded { axis, belief: axis, whole, holdout, except: &[], watch };
+    let mut look = looks::all(&recorded, (&columns, &first), notes.clone())?;
+    if look.is_final {
+        return watch.at(1.0, "done").map(|()| look.found);
     }
-    let (mut frame, mut heard, mut by_first) = (first.clone(), None, true);
-    for _ in 0..quiet::MOST {
-        if !quiet::may_hide_more(&found) {
-            break;
-        }
-        let wide = wider.take().unwrap_or_else(|| look_wider(&frame));
-        // What was heard once is asked again whether that is quieter or not.
-        if !what_is_missing(&wide).is_empty() || heard.is_none() && !quiet::promises(&wide, &frame, &found) {
-            break;
-        }
-        let again = answer(&recorded, &wide, notes.clone())?;
-        if quiet::finds_more(axis, &again, &found) {
-            (found, by_first) = (again, false);
-        } else if found.verdict == Verdict::NoDiscrepancy {
-            match heard.take().filter(|before| quiet::agree(axis, before, &again)) {
-                Some(before) => (found, by_first) = (before, false),
-                None => heard = Some(again),
-            }
-        }
-        frame = wide;
+    let made = twin::made_by_sensors(&recorded, &first, &look)?;
+    if !made.is_empty() {
+        let except = Recorded { except: &made, ..recorded };
+        look = looks::all(&except, (&columns, &first), notes)?;
+        look.found.notes.push(twin::says(&made));
     }
+    let (by_first, mut found) = (look.width == first.low_pass.width, look.found);
     // What a quieter look has heard the first does not judge.
     let known = found.replay.clone();
     let replays = Replays::new(whole, known.as_ref(), watch);
@@ -186,24 +156,35 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
         if let Some(sharper) = by_loop::sharpened(axis, (replays, holdout), &first, &found, watch)? {
             return watch.at(1.0, "done").map(|()| sharper);
         }
-        found = by_loop::settled(found, replays, &first);
+        found = by_loop::settled(found, replays, &first, holdout.is_some());
     }
     let found = by_loop::completed(axis, (replays.as_ref(), holdout), &first, found, watch)?;
     watch.at(1.0, "done").map(|()| found)
 }
 
 /// What an answer is about beside the equations.
-struct Recorded<'d> {
-    axis: &'d Axis,
+#[derive(Clone, Copy)]
+pub(super) struct Recorded<'d> {
+    pub axis: &'d Axis,
     /// What of the axis is taken for granted.
-    belief: &'d Axis,
-    whole: &'d Whole<'d>,
-    holdout: Option<&'d Excerpt>,
-    watch: &'d Watch<'d>,
+    pub belief: &'d Axis,
+    pub whole: &'d Whole<'d>,
+    pub holdout: Option<&'d Excerpt>,
+    /// What is not looked for.
+    pub except: &'d [Cause],
+    pub watch: &'d Watch<'d>,
+}
+
+impl Recorded<'_> {
+    /// Whether a cause is looked for.
+    #[must_use]
+    pub fn may_be_found(&self, cause: Cause) -> bool {
+        belief::may_be_found(self.belief, cause) && !self.except.contains(&cause)
+    }
 }
 
 /// The answer on one system of equations; on aligned ones where the torque column turns out to be late by its sampling.
-fn answer(recorded: &Recorded, frame: &Frame, notes: Vec<String>) -> Result<Diagnosis, Stopped> {
+pub(super) fn answer(recorded: &Recorded, frame: &Frame, notes: Vec<String>) -> Result<Diagnosis, Stopped> {
     let bench = Bench::new(frame, &Known::of(recorded.belief, frame));
     let found = answer_on(recorded, &bench, None, notes.clone())?;
     let Recorded { axis, belief, .. } = recorded;
@@ -219,7 +200,8 @@ fn answer(recorded: &Recorded, frame: &Frame, notes: Vec<String>) -> Result<Diag
             }
         }
     }
-    let open = matches!(found.verdict, Verdict::UnknownCause | Verdict::PartlyExplained);
+    let open = matches!(found.verdict, Verdict::UnknownCause | Verdict::PartlyExplained)
+        && recorded.may_be_found(Cause::ExternalVibration);
     if let Some(band) = open.then(|| narrow::band(&bench)).flatten() {
         let beside = bench.beside_lines(&band.columns);
         let again = answer_on(recorded, &beside, Some(&band), notes)?;
@@ -239,10 +221,10 @@ fn answer_on(
     vibration: Option<&Band>,
     mut notes: Vec<String>,
 ) -> Result<Diagnosis, Stopped> {
-    let &Recorded { axis, belief, whole, holdout, watch } = recorded;
+    let &Recorded { axis, belief, whole, holdout, watch, .. } = recorded;
     let frame = bench.frame;
     let empty = bench.fit(Vec::new());
-    let laws: Vec<&'static Law> = LAWS.iter().copied().filter(|law| belief::may_be_found(belief, law.cause)).collect();
+    let laws: Vec<&'static Law> = LAWS.iter().copied().filter(|law| recorded.may_be_found(law.cause)).collect();
     let judge = || Ok(Judge::new([axis, belief], whole, bench, watch));
     let (judge, search) = watch.both(judge, || Search::new(bench, &laws, watch))?;
     let found = search.from_belief()?;

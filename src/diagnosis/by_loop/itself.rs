@@ -84,10 +84,11 @@ impl<'i> Itself<'i> {
         own.iter().map(of).reduce(more)
     }
 
-    /// Whether the machine leaves no more of a frame than of recordings of its own. A scale tells more of a table than they do.
+    /// Whether the machine leaves no more of a frame's torque than of recordings of its own. What a table does that is not as it should be
+    /// a scale tells better than they do.
     #[must_use]
     pub fn leaves_as_much(&self, frame: &Frame) -> bool {
-        if self.replays.whole.columns.table.is_some() {
+        if Excess::of_machine(self.machine, frame).of_channel(1) > LITTLE_LEFT {
             return false;
         }
         let measured = Leaves::of(self.machine, &frame.believing(&self.base));
@@ -115,7 +116,9 @@ impl<'i> Itself<'i> {
                 let own = self.leaves(&look)?;
                 let more = |at: usize| measured.goes_with[at] - own.goes_with[at];
                 let at = usize::from(more(1) > more(0));
-                if more(at) > least {
+                // Readings that beat with the rows make slow tones, which lie anywhere, and a little more or less of them.
+                let beats = own.goes_with[0].max(own.goes_with[1]);
+                if more(at) > least && measured.goes_with[at] > AS_MUCH * beats {
                     shown = Some((WHERE[at], measured.goes_with[at] / measured.squares));
                 }
             }
@@ -126,7 +129,7 @@ impl<'i> Itself<'i> {
 
 /// An answer by the look of a frame. One that doubts a machine, or leaves something beside what was found, by no more than a recording of
 /// its own would is put right, and one that finds nothing where more than that goes with a place or a time.
-pub fn settled(mut found: Diagnosis, replays: &Replays, frame: &Frame) -> Diagnosis {
+pub fn settled(mut found: Diagnosis, replays: &Replays, frame: &Frame, by_holdout: bool) -> Diagnosis {
     let doubts = match found.verdict {
         Verdict::NoDiscrepancy => false,
         Verdict::UnknownCause => true,
@@ -134,7 +137,7 @@ pub fn settled(mut found: Diagnosis, replays: &Replays, frame: &Frame) -> Diagno
         _ => return found,
     };
     // What only a hold-out shows is not to be seen here.
-    if doubts && Excess::of_machine(&found.extended, frame).largest() <= LITTLE_LEFT {
+    if doubts && by_holdout && Excess::of_machine(&found.extended, frame).largest() <= LITTLE_LEFT {
         return found;
     }
     let itself = Itself::of(replays, &found.extended);

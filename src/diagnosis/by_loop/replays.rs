@@ -27,6 +27,9 @@ const MOST_OF_ROWS: usize = 4;
 
 /// Noise of a sensor over its grid that readings at rest may hide.
 const FLICKER: f64 = 0.2;
+/// Noise over the grid that readings without any may seem to have: their fourth differences are whole steps, of which the median may be
+/// four.
+const OF_STEPS: f64 = 0.75;
 
 /// By what a machine misses the measured position, and how far each block is missed whatever the machine.
 type ErrorAndUnavoidable = (Vec<f64>, Vec<f64>);
@@ -127,12 +130,12 @@ impl<'r> Replays<'r> {
     }
 
     /// The sensors that this recording may be made by. Where readings rest they hide noise that is small beside their grid, and where there
-    /// is none an axis swings about one step: either is possible.
+    /// is none an axis swings about one step; readings that jump to and fro between two steps seem to have noise and need have none.
     fn sensors(&self) -> Vec<Sensors> {
         let grid = statistics::grid(&self.recording.0.position).unwrap_or(0.0);
         let noise = (self.floor.powi(2) - grid * grid / 12.0).max(0.0).sqrt();
         let of = |noise: f64| Sensors { grid_um: 1e3 * grid, noise_um: 1e3 * noise, ..Sensors::default() };
-        if noise < FLICKER * grid { vec![of(noise), of(FLICKER * grid)] } else { vec![of(noise)] }
+        if noise < OF_STEPS * grid { vec![of(0.0), of(noise.max(FLICKER * grid))] } else { vec![of(noise)] }
     }
 
     fn through(&self, sensors: Sensors, axis: &Axis) -> Option<[Vec<f64>; 2]> {

@@ -4,6 +4,12 @@ use super::{Frame, SCALES_HOLD, norm};
 use crate::analysis::statistics::median;
 
 impl Frame<'_> {
+    /// What white noise of the torque of deviation 1 in each row is at the judged rows.
+    #[must_use]
+    pub fn of_white_noise(&self) -> f64 {
+        norm(&self.torque_kernel)
+    }
+
     /// Noise floor of a filtered column at the judged rows, in its unit: what white noise through the filter would be,
     /// judged by second differences, in which slow structure is gone, and what the encoder's grid makes beyond that. `averaged`
     /// says that the column is torque, which went through the three-point mean as well.

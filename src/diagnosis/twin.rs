@@ -1,0 +1,117 @@
+//! What a diagnosis finds in a recording that the machine without it would leave.
+//!
+//! A servo answers the grid and the noise of its encoder. At steady feeds the readings beat with the rows, and behind a coarse or noisy
+//! encoder so much torque is made that chance looks like a law. The loop of the machine without a small finding is replayed through such an
+//! encoder, with noise of that size on its torque, and diagnosed in the same way: what is named there, too, is made by the sensors.
+//! (A parametric bootstrap, Efron 1979.)
+
+use super::by_loop::Replays;
+use super::fit::Bench;
+use super::frame::{Columns, Frame};
+use super::judge::Excess;
+use super::known::Known;
+use super::looks::{self, Look};
+use super::progress::Stopped;
+use super::verdict::{Diagnosis, Finding, Recorded, Verdict, answer};
+use super::whole::Whole;
+use super::belief;
+use crate::machine::{Axis, Cause, Effect};
+use crate::plant::noise::Noise;
+
+/// Variance that a finding explains, in units of the noise's, up to which sensors may have made it.
+const SMALL: f64 = 10.0;
+/// Share of the variance in a narrow band from which on what the sensors make above the noise may be that band at another frequency: a beat
+/// goes with the last digit of a feed.
+const ALIKE: f64 = 0.5;
+/// What a scale shows the replayed motor does not.
+const OF_SCALE: [Cause; 2] = [Cause::ScrewPitchError, Cause::ScrewPeriodicError];
+/// Of the twin's noise.
+const SEED: u64 = 1979;
+
+/// The causes of what a look finds that its sensors would make without them.
+///
+/// # Errors
+/// [`Stopped`] when the watch's caller said so.
+pub fn made_by_sensors(recorded: &Recorded, first: &Frame, look: &Look) -> Result<Vec<Cause>, Stopped> {
+    let (axis, found) = (recorded.axis, &look.found);
+    let variance = 1.0 + Excess::of_machine(axis, first).of_channel(0);
+    let is_small = |finding: &&Finding| finding.share * variance < SMALL && !OF_SCALE.contains(&finding.effect.cause());
+    let small: Vec<Cause> = found.findings.iter().filter(is_small).map(|finding| finding.effect.cause()).collect();
+    if small.is_empty() {
+        return Ok(small);
+    }
+    // A vibration in a narrow band is in no extended machine.
+    let band = |cause: Cause| {
+        let lines = found.extended.effects.iter().all(|effect| effect.cause() != Cause::ExternalVibration);
+        let findings = || found.findings.iter().filter(|finding| finding.effect.cause() == cause);
+        let share: f64 = findings().map(|finding| finding.share).sum();
+        (cause == Cause::ExternalVibration && lines).then_some(share * variance * floor(axis, first).powi(2))
+    };
+    let kept = found.findings.iter().map(|finding| finding.effect).filter(|effect| !small.contains(&effect.cause()));
+    let without = belief::extended(axis, &kept.collect::<Vec<Effect>>());
+    let replays = Replays::new(recorded.whole, found.replay.as_ref(), recorded.watch);
+    let Some(replays) = replays else { return Ok(Vec::new()) };
+    let base = belief::base_alone(&without);
+    let noise = floor(&found.extended, first);
+    for motion in replays.recordings_of(&without) {
+        let columns = noisy(&without, recorded.whole.columns, motion, (first.low_pass.width, noise));
+        let whole = Whole::new(&without, &columns);
+        let twin = Recorded { axis: &without, belief: &without, whole: &whole, holdout: None, ..*recorded };
+        let thinned = columns.clone().thinned();
+        let look_at = |width| answer(&twin, &looks::frame(&twin, &base, &thinned, Some(width)), Vec::new());
+        let again = look_at(look.width)?;
+        let doubts = |found: &Diagnosis| found.verdict != Verdict::NoDiscrepancy;
+        // A quieter look that doubts a machine by its own recording tells nothing small, nor one that only the next agrees with.
+        if look.width != first.low_pass.width && (doubts(&again) || doubts(&look_at(2 * look.width + 1)?)) {
+            return Ok(small);
+        }
+        let named: Vec<Cause> = again.findings.iter().map(|finding| finding.effect.cause()).collect();
+        let beats = above_noise(&without, &looks::frame(&twin, &base, &thinned, Some(first.low_pass.width)));
+        let is_made = |cause: &Cause| named.contains(cause) || band(*cause).is_some_and(|explains| beats > ALIKE * explains);
+        let made: Vec<Cause> = small.iter().copied().filter(is_made).collect();
+        if !made.is_empty() {
+            return Ok(made);
+        }
+    }
+    Ok(Vec::new())
+}
+
+/// What is said of causes that are not named because of it.
+#[must_use]
+pub fn says(made: &[Cause]) -> String {
+    let names: Vec<&str> = made.iter().map(|cause| cause.name()).collect();
+    let names = names.join(" and ");
+    format!("{names} would explain some, but so it would in a recording of this machine without it, behind an encoder of this grid and noise: it is not named")
+}
+
+/// Variance above the noise floor that a machine leaves of the torque.
+fn above_noise(machine: &Axis, frame: &Frame) -> f64 {
+    Excess::of_machine(machine, frame).of_channel(0) * floor(machine, frame).powi(2)
+}
+
+/// The noise floor of what a machine leaves of the torque.
+fn floor(machine: &Axis, frame: &Frame) -> f64 {
+    let base = belief::base_alone(machine);
+    let frame = frame.believing(&base);
+    let bench = Bench::new(&frame, &Known::of(machine, &frame));
+    frame.floor(&bench.rest(&bench.fit(Vec::new()))[0], true)
+}
+
+/// Columns of a motion, the torque with as much noise as makes `noise` through a low-pass of this width together with what the encoder makes.
+fn noisy(
+    machine: &Axis,
+    like: &Columns,
+    [position, torque]: [Vec<f64>; 2],
+    (width, noise): (usize, f64),
+) -> Columns {
+    let base = belief::base_alone(machine);
+    let mut columns = like.with_motion(position, torque);
+    columns.command = like.command.as_ref().map(|command| command[..columns.position.len()].to_vec());
+    let thinned = columns.clone().thinned();
+    let frame = Frame::new(&base, &thinned, Some(width));
+    let missing = (noise.powi(2) - floor(machine, &frame).powi(2)).max(0.0).sqrt() / frame.of_white_noise();
+    let deviation = missing * (thinned.period_s / columns.period_s).sqrt();
+    let mut random = Noise::new(SEED);
+    columns.torque.iter_mut().for_each(|torque| *torque += random.normal(deviation));
+    columns
+}
