@@ -12,6 +12,7 @@ use super::frame::{Columns, Frame};
 use super::many::{add, dot, sines_and_cosines};
 use crate::analysis::statistics;
 use crate::machine::Cause;
+use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
 
 /// Terms of the sawtooth.
@@ -23,6 +24,9 @@ const OFFSETS: [f64; 4] = [0.07, 0.31, 0.53, 0.84];
 /// How much larger than what the grids make a cause must be. Places on the grid are known to a fifth of a step or so, which
 /// takes up to half off the sums.
 const SURELY: f64 = 2.0;
+
+/// Rows over which a servo's filters may spread its answer.
+const ROWS_OF_ANSWER: usize = 3;
 
 /// What the encoder's grid makes in the torque balance through the inertia, RMS over the judged rows, drive's own unit, beyond
 /// what the second differences of a noise floor see of it: a speed at which rows meet the grid at nearly the same place makes a
@@ -59,18 +63,41 @@ fn of_readings_through_inertia(frame: &Frame) -> f64 {
     (per * statistics::reading_error(&frame.columns.position) * norm(&bends)).powi(2)
 }
 
+/// Mean square of what the encoder makes in the torque balance through the inertia: by its grid as rows beat with it, or by what a reading is
+/// off by from row to row, whichever makes more.
+#[must_use]
+pub fn made_of_readings(frame: &Frame) -> f64 {
+    mean_square(&through_inertia(frame)).max(of_readings_through_inertia(frame))
+}
+
 /// By how much the torque column may seem early by what the encoder is off by, s. The servo answers to that error e with −Kv·ė,
 /// whose slope goes with the J·ë that the balance has of it: Kv/J·mean (J·ë)² over mean Ṫ², where e is the grid's as rows beat with
-/// it, or what a reading is off by from row to row, whichever makes more. 0 without a servo.
+/// it, or what a reading is off by from row to row, whichever makes more. A servo that nobody knows shows its Kv by its answer.
 #[must_use]
 pub fn delay_s(frame: &Frame) -> f64 {
-    let Some(servo) = &frame.axis.servo else { return 0.0 };
+    let velocity_gain = frame.axis.servo.as_ref().map_or_else(|| answer(frame), |servo| servo.velocity_gain);
     let half = 0.5 * frame.columns.period_s;
     let (after, before) = (frame.torque(half), frame.torque(-half));
     let sides = after.iter().zip(&before).zip(&frame.weights);
     let slope: Vec<f64> = sides.map(|((after, before), weight)| weight * (after - before) / (2.0 * half)).collect();
-    let made = mean_square(&through_inertia(frame)).max(of_readings_through_inertia(frame));
-    servo.velocity_gain / frame.belief.inertia * made / mean_square(&slope).max(1e-300)
+    let made = made_of_readings(frame);
+    velocity_gain / frame.belief.inertia * made / mean_square(&slope).max(1e-300)
+}
+
+/// How much of the torque answers to a speed that the encoder reads, by what is so fast that the axis does not follow it: second differences of
+/// both, over the rows in which a servo may have filtered it. As a velocity gain, positive; 0 where there is no such answer.
+fn answer(frame: &Frame) -> f64 {
+    let columns = frame.columns;
+    let per = frame.unit / columns.period_s;
+    let fast = |values: &[f64], row: usize| values[row] - 2.0 * values[row - 1] + values[row - 2];
+    let speed = |row: usize| per * (fast(&columns.position, row) - fast(&columns.position, row - 1));
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for &row in frame.kept.iter().filter(|row| **row >= ROWS_OF_ANSWER + 3) {
+        let read = Vector3::from_fn(|late, _| speed(row - late));
+        normal += read * read.transpose();
+        right += read * fast(&columns.torque, row);
+    }
+    normal.try_inverse().map_or(0.0, |inverse| -(inverse * right).sum()).max(0.0)
 }
 
 /// What the grids of encoder and scale make in table − encoder, RMS over the judged rows, load units; 0 without a scale. It
@@ -296,4 +323,52 @@ fn cleared(columns: &[Vec<f64>], basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
         }
     }
     all.split_off(basis.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::causes::periods::{shows_along_stroke, waves};
+    use crate::diagnosis::excerpt::Excerpt;
+    use crate::machine::{Axis, Machine};
+    use crate::plant::moves::Moves;
+    use crate::plant::simulate::{Sensors, Setup, simulate};
+    use crate::recording::{Column, Recording};
+
+    /// Strokes over 200 mm at one speed, behind an encoder of this noise, as the machine is believed.
+    fn strokes(speed: f64, noise_um: f64, asks: impl Fn(&Frame, &Frame)) {
+        let rig = include_str!("../../examples/machines/believed.json");
+        let known: Axis = Machine::parse(rig).unwrap().axes.remove(0);
+        let stroke =
+            |to: f64| format!(r#"{{"to_mm":{to},"speed_mm_s":{speed},"acceleration_mm_s2":2000}},{{"dwell_s":0.2}}"#);
+        let list = (0..12).map(|k| stroke(if k % 2 == 0 { 200.0 } else { 0.0 })).collect::<Vec<_>>().join(",");
+        let moves = Moves::parse(&format!(r#"{{"schema":"gib.moves/1","moves":[{{"dwell_s":0.5}},{list}]}}"#)).unwrap();
+        let sensors = Sensors { grid_um: 0.02, noise_um, torque_noise: 0.01, ..Sensors::default() };
+        let trace = simulate(&known, &moves.command(1e-3), &Setup { seed: 1, sensors, ..Setup::default() }).unwrap();
+        let columns = vec![Column::new("x.position_mm", trace.position), Column::new("x.torque_nm", trace.torque)];
+        let recording = Recording::from_columns("strokes", trace.time_s, columns).unwrap();
+        let columns = Excerpt::of(&recording, &known).columns.unwrap();
+        let unknown = Axis { servo: None, ..known.clone() };
+        asks(&Frame::new(&known, &columns, None), &Frame::new(&unknown, &columns, None));
+    }
+
+    #[test]
+    fn a_servo_that_nobody_knows_shows_its_gain_where_it_answers_noise() {
+        strokes(150.0, 0.3, |known, unknown| {
+            let gain = known.axis.servo.as_ref().unwrap().velocity_gain;
+            // Its torque loop has not caught up within a cycle.
+            assert!((0.75..1.05).contains(&(answer(unknown) / gain)), "{} of {gain}", answer(unknown));
+            assert!((0.7..1.1).contains(&(delay_s(unknown) / delay_s(known))));
+        });
+        strokes(150.0, 0.0, |_, unknown| assert!(delay_s(unknown) < 1e-4, "{}", delay_s(unknown)));
+    }
+
+    #[test]
+    fn a_ripple_that_is_passed_too_fast_but_at_the_turns_shows_along_no_stroke() {
+        strokes(187.0, 0.0, |frame, _| {
+            let ripple = |period_mm: f64| frame.judged_instants(&waves(frame, 200.0 / period_mm).0);
+            assert!(shows_along_stroke(frame, &ripple(2.5)) && shows_along_stroke(frame, &ripple(1.0)));
+            assert!(!shows_along_stroke(frame, &ripple(0.17)));
+        });
+    }
 }

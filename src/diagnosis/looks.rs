@@ -20,7 +20,12 @@ pub struct Look {
 }
 
 /// A frame of a recording's columns without rows at which the table may still swing from before.
-pub fn frame<'a>(recorded: &Recorded, base: &'a crate::machine::Axis, columns: &'a Columns, width: Option<usize>) -> Frame<'a> {
+pub fn frame<'a>(
+    recorded: &Recorded,
+    base: &'a crate::machine::Axis,
+    columns: &'a Columns,
+    width: Option<usize>,
+) -> Frame<'a> {
     without_swings(recorded, Frame::new(base, columns, width))
 }
 

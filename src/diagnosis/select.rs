@@ -6,7 +6,7 @@
 
 use super::approach::Approach;
 use super::astray;
-use super::causes::periods::{FEW, is_all_the_time, is_in_each_period};
+use super::causes::periods::{FEW, is_all_the_time, is_in_each_period, shows_along_stroke};
 use super::causes::{Law, loose_spring};
 use super::fit::{Bench, Fit, Part, figure};
 use super::form;
@@ -466,7 +466,7 @@ fn few_periods(part: &Part) -> bool {
     along_stroke && part.shape.first().is_some_and(|periods| *periods < FEW)
 }
 
-/// A ripple of few periods that is not there in each of them, or a vibration that is not there all the time.
+/// A ripple that shows at few places, or of few periods and not there in each of them, or a vibration that is not there all the time.
 pub fn once_only(bench: &Bench, fit: &Fit) -> Option<usize> {
     (0..fit.parts.len()).find(|&i| {
         let Part { law, shape, .. } = &fit.parts[i];
@@ -474,8 +474,9 @@ pub fn once_only(bench: &Bench, fit: &Fit) -> Option<usize> {
             return !is_all_the_time(bench.frame, &fit.contribution(i), &without_neighbours(fit, i));
         }
         let channel = if law.cause == Cause::Cogging { 0..bench.rows } else { bench.rows..fit.residual.len() };
-        few_periods(&fit.parts[i])
-            && !is_in_each_period(bench.frame, shape[0], &fit.contribution(i)[channel.clone()], &fit.residual[channel])
+        let (ripple, left) = (&fit.contribution(i)[channel.clone()], &fit.residual[channel]);
+        law.cause == Cause::Cogging && !shows_along_stroke(bench.frame, ripple)
+            || few_periods(&fit.parts[i]) && !is_in_each_period(bench.frame, shape[0], ripple, left)
     })
 }
 

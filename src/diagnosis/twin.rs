@@ -5,21 +5,23 @@
 //! encoder, with noise of that size on its torque, and diagnosed in the same way: what is named there, too, is made by the sensors.
 //! (A parametric bootstrap, Efron 1979.)
 
+use super::belief;
 use super::by_loop::Replays;
 use super::fit::Bench;
 use super::frame::{Columns, Frame};
+use super::grids;
 use super::judge::Excess;
 use super::known::Known;
 use super::looks::{self, Look};
 use super::progress::Stopped;
 use super::verdict::{Diagnosis, Finding, Recorded, Verdict, answer};
 use super::whole::Whole;
-use super::belief;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::noise::Noise;
 
-/// Variance that a finding explains, in units of the noise's, up to which sensors may have made it.
-const SMALL: f64 = 10.0;
+/// Variance that a finding explains over that which readings make through the inertia up to which sensors may have made it: what is there
+/// explained 17 times that and more, what was not 0.7 to 1.7 times.
+const SMALL: f64 = 4.0;
 /// Share of the variance in a narrow band from which on what the sensors make above the noise may be that band at another frequency: a beat
 /// goes with the last digit of a feed.
 const ALIKE: f64 = 0.5;
@@ -34,8 +36,9 @@ const SEED: u64 = 1979;
 /// [`Stopped`] when the watch's caller said so.
 pub fn made_by_sensors(recorded: &Recorded, first: &Frame, look: &Look) -> Result<Vec<Cause>, Stopped> {
     let (axis, found) = (recorded.axis, &look.found);
-    let variance = 1.0 + Excess::of_machine(axis, first).of_channel(0);
-    let is_small = |finding: &&Finding| finding.share * variance < SMALL && !OF_SCALE.contains(&finding.effect.cause());
+    let variance = (1.0 + Excess::of_machine(axis, first).of_channel(0)) * floor(axis, first).powi(2);
+    let most = SMALL * grids::made_of_readings(first);
+    let is_small = |finding: &&Finding| finding.share * variance < most && !OF_SCALE.contains(&finding.effect.cause());
     let small: Vec<Cause> = found.findings.iter().filter(is_small).map(|finding| finding.effect.cause()).collect();
     if small.is_empty() {
         return Ok(small);
@@ -45,7 +48,7 @@ pub fn made_by_sensors(recorded: &Recorded, first: &Frame, look: &Look) -> Resul
         let lines = found.extended.effects.iter().all(|effect| effect.cause() != Cause::ExternalVibration);
         let findings = || found.findings.iter().filter(|finding| finding.effect.cause() == cause);
         let share: f64 = findings().map(|finding| finding.share).sum();
-        (cause == Cause::ExternalVibration && lines).then_some(share * variance * floor(axis, first).powi(2))
+        (cause == Cause::ExternalVibration && lines).then_some(share * variance)
     };
     let kept = found.findings.iter().map(|finding| finding.effect).filter(|effect| !small.contains(&effect.cause()));
     let without = belief::extended(axis, &kept.collect::<Vec<Effect>>());
@@ -53,8 +56,8 @@ pub fn made_by_sensors(recorded: &Recorded, first: &Frame, look: &Look) -> Resul
     let Some(replays) = replays else { return Ok(Vec::new()) };
     let base = belief::base_alone(&without);
     let noise = floor(&found.extended, first);
-    for motion in replays.recordings_of(&without) {
-        let columns = noisy(&without, recorded.whole.columns, motion, (first.low_pass.width, noise));
+    let made_in = |motion: &[Vec<f64>; 2]| -> Result<Vec<Cause>, Stopped> {
+        let columns = noisy(&without, recorded.whole.columns, motion.clone(), (first.low_pass.width, noise));
         let whole = Whole::new(&without, &columns);
         let twin = Recorded { axis: &without, belief: &without, whole: &whole, holdout: None, ..*recorded };
         let thinned = columns.clone().thinned();
@@ -63,17 +66,24 @@ pub fn made_by_sensors(recorded: &Recorded, first: &Frame, look: &Look) -> Resul
         let doubts = |found: &Diagnosis| found.verdict != Verdict::NoDiscrepancy;
         // A quieter look that doubts a machine by its own recording tells nothing small, nor one that only the next agrees with.
         if look.width != first.low_pass.width && (doubts(&again) || doubts(&look_at(2 * look.width + 1)?)) {
-            return Ok(small);
+            return Ok(small.clone());
         }
         let named: Vec<Cause> = again.findings.iter().map(|finding| finding.effect.cause()).collect();
         let beats = above_noise(&without, &looks::frame(&twin, &base, &thinned, Some(first.low_pass.width)));
-        let is_made = |cause: &Cause| named.contains(cause) || band(*cause).is_some_and(|explains| beats > ALIKE * explains);
-        let made: Vec<Cause> = small.iter().copied().filter(is_made).collect();
-        if !made.is_empty() {
-            return Ok(made);
-        }
+        let is_made =
+            |cause: &Cause| named.contains(cause) || band(*cause).is_some_and(|explains| beats > ALIKE * explains);
+        Ok(small.iter().copied().filter(is_made).collect())
+    };
+    let motions: Vec<_> = replays.recordings_of(&without).collect();
+    let mut made = Vec::new();
+    for of_one in
+        recorded.watch.each(&motions, (0.96, 0.97), "asking a recording of the machine without it", made_in)?
+    {
+        made.extend(of_one?);
     }
-    Ok(Vec::new())
+    made.sort();
+    made.dedup();
+    Ok(made)
 }
 
 /// What is said of causes that are not named because of it.
@@ -81,7 +91,9 @@ pub fn made_by_sensors(recorded: &Recorded, first: &Frame, look: &Look) -> Resul
 pub fn says(made: &[Cause]) -> String {
     let names: Vec<&str> = made.iter().map(|cause| cause.name()).collect();
     let names = names.join(" and ");
-    format!("{names} would explain some, but so it would in a recording of this machine without it, behind an encoder of this grid and noise: it is not named")
+    format!(
+        "{names} would explain some, but so it would in a recording of this machine without it, behind an encoder of this grid and noise: it is not named"
+    )
 }
 
 /// Variance above the noise floor that a machine leaves of the torque.
@@ -98,12 +110,7 @@ fn floor(machine: &Axis, frame: &Frame) -> f64 {
 }
 
 /// Columns of a motion, the torque with as much noise as makes `noise` through a low-pass of this width together with what the encoder makes.
-fn noisy(
-    machine: &Axis,
-    like: &Columns,
-    [position, torque]: [Vec<f64>; 2],
-    (width, noise): (usize, f64),
-) -> Columns {
+fn noisy(machine: &Axis, like: &Columns, [position, torque]: [Vec<f64>; 2], (width, noise): (usize, f64)) -> Columns {
     let base = belief::base_alone(machine);
     let mut columns = like.with_motion(position, torque);
     columns.command = like.command.as_ref().map(|command| command[..columns.position.len()].to_vec());

@@ -83,6 +83,24 @@ pub fn is_in_each_period(frame: &Frame, periods: f64, ripple: &[f64], left: &[f6
     is_in_each(count, |row| (frame.x[row] - low) / (high - low), frame, ripple, left)
 }
 
+/// Whether a ripple along the stroke shows in a quarter of the places at least that were passed: one that the axis passes too fast to tell
+/// but near its turns repeats nowhere.
+pub fn shows_along_stroke(frame: &Frame, ripple: &[f64]) -> bool {
+    const PLACES: usize = 16;
+    const LEAST: f64 = 0.1;
+    let (low, high) = frame.stroke();
+    let mut places = [(0.0, 0.0); PLACES];
+    for (&row, ripple) in frame.kept.iter().zip(ripple) {
+        let place = (frame.x[row] - low) / (high - low) * PLACES as f64;
+        let (squares, rows) = &mut places[(place as usize).min(PLACES - 1)];
+        (*squares, *rows) = (*squares + ripple * ripple, *rows + 1.0);
+    }
+    let passed: Vec<f64> =
+        places.iter().filter(|(_, rows)| *rows > 0.0).map(|(squares, rows)| squares / rows).collect();
+    let mean = passed.iter().sum::<f64>() / passed.len().max(1) as f64;
+    4 * passed.iter().filter(|square| **square > LEAST * mean).count() >= passed.len()
+}
+
 /// Whether a vibration is there in each eighth of the recording. What a single feed makes, as the encoder's grid does, ends
 /// with it.
 pub fn is_all_the_time(frame: &Frame, ripple: &[f64], left: &[f64]) -> bool {

@@ -53,8 +53,8 @@ const fn with_exponent(scales: &'static [Scale]) -> Law {
             let level = *c.first()?;
             let [displacement_um, exponent, maxwell_slip] = shape.try_into().ok()?;
             let as_friction = level > 0.4 * frame.belief.coulomb && level < 2.5 * frame.belief.coulomb;
-            // What builds up within a step or two of the encoder is as if it were there at once.
-            let sound = as_friction && displacement_um * 1e-3 >= 2.0 * frame.columns.position_grid;
+            // What builds up within a step or two that the encoder tells for sure is as if it were there at once.
+            let sound = as_friction && displacement_um * 1e-3 >= 2.0 * frame.resolution;
             // Less than no damping is noise.
             let micro_damping_s = c.get(1).map_or(0.0, |c| (c / level).max(0.0));
             sound.then_some(Effect::PreslidingFriction { displacement_um, exponent, maxwell_slip, micro_damping_s })
