@@ -38,7 +38,11 @@ pub fn made_by_sensors(recorded: &Recorded, first: &Frame, look: &Look) -> Resul
     let (axis, found) = (recorded.axis, &look.found);
     let variance = (1.0 + Excess::of_machine(axis, first).of_channel(0)) * floor(axis, first).powi(2);
     let most = SMALL * grids::made_of_readings(first);
-    let is_small = |finding: &&Finding| finding.share * variance < most && !OF_SCALE.contains(&finding.effect.cause());
+    // A quieter look is one for much that the encoder makes.
+    let quieter = look.width != first.low_pass.width;
+    let is_small = |finding: &&Finding| {
+        (quieter || finding.share * variance < most) && !OF_SCALE.contains(&finding.effect.cause())
+    };
     let small: Vec<Cause> = found.findings.iter().filter(is_small).map(|finding| finding.effect.cause()).collect();
     if small.is_empty() {
         return Ok(small);
@@ -65,7 +69,7 @@ pub fn made_by_sensors(recorded: &Recorded, first: &Frame, look: &Look) -> Resul
         let again = look_at(look.width)?;
         let doubts = |found: &Diagnosis| found.verdict != Verdict::NoDiscrepancy;
         // A quieter look that doubts a machine by its own recording tells nothing small, nor one that only the next agrees with.
-        if look.width != first.low_pass.width && (doubts(&again) || doubts(&look_at(2 * look.width + 1)?)) {
+        if quieter && (doubts(&again) || doubts(&look_at(2 * look.width + 1)?)) {
             return Ok(small.clone());
         }
         let named: Vec<Cause> = again.findings.iter().map(|finding| finding.effect.cause()).collect();
