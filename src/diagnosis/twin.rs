@@ -14,7 +14,7 @@ use super::judge::Excess;
 use super::known::Known;
 use super::looks::{self, Look};
 use super::progress::Stopped;
-use super::verdict::{Diagnosis, Finding, Recorded, Verdict, answer};
+use super::verdict::{Diagnosis, Recorded, Verdict, answer};
 use super::whole::Whole;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::noise::Noise;
@@ -36,24 +36,25 @@ const SEED: u64 = 1979;
 /// [`Stopped`] when the watch's caller said so.
 pub fn made_by_sensors(recorded: &Recorded, first: &Frame, look: &Look) -> Result<Vec<Cause>, Stopped> {
     let (axis, found) = (recorded.axis, &look.found);
-    let variance = (1.0 + Excess::of_machine(axis, first).of_channel(0)) * floor(axis, first).powi(2);
-    let most = SMALL * grids::made_of_readings(first);
-    // A quieter look is one for much that the encoder makes.
+    let base = belief::base_alone(axis);
     let quieter = look.width != first.low_pass.width;
-    let is_small = |finding: &&Finding| {
-        (quieter || finding.share * variance < most) && !OF_SCALE.contains(&finding.effect.cause())
+    let columns = recorded.whole.columns.clone().thinned();
+    let heard = if quieter { &looks::frame(recorded, &base, &columns, Some(look.width)) } else { first };
+    let variance = (1.0 + Excess::of_machine(axis, heard).of_channel(0)) * floor(axis, heard).powi(2);
+    let explains = |cause: Cause| {
+        let findings = found.findings.iter().filter(|finding| finding.effect.cause() == cause);
+        findings.map(|finding| finding.share).sum::<f64>() * variance
     };
-    let small: Vec<Cause> = found.findings.iter().filter(is_small).map(|finding| finding.effect.cause()).collect();
+    // A quieter look is one for much that the encoder makes.
+    let most = if quieter { f64::INFINITY } else { SMALL * grids::made_of_readings(first) };
+    let named = found.findings.iter().map(|finding| finding.effect.cause());
+    let small: Vec<Cause> = named.filter(|cause| explains(*cause) < most && !OF_SCALE.contains(cause)).collect();
     if small.is_empty() {
         return Ok(small);
     }
     // A vibration in a narrow band is in no extended machine.
-    let band = |cause: Cause| {
-        let lines = found.extended.effects.iter().all(|effect| effect.cause() != Cause::ExternalVibration);
-        let findings = || found.findings.iter().filter(|finding| finding.effect.cause() == cause);
-        let share: f64 = findings().map(|finding| finding.share).sum();
-        (cause == Cause::ExternalVibration && lines).then_some(share * variance)
-    };
+    let lines = found.extended.effects.iter().any(|effect| effect.cause() == Cause::ExternalVibration);
+    let is_band = |cause: Cause| cause == Cause::ExternalVibration && !lines;
     let kept = found.findings.iter().map(|finding| finding.effect).filter(|effect| !small.contains(&effect.cause()));
     let without = belief::extended(axis, &kept.collect::<Vec<Effect>>());
     let replays = Replays::new(recorded.whole, found.replay.as_ref(), recorded.watch);
@@ -68,14 +69,15 @@ pub fn made_by_sensors(recorded: &Recorded, first: &Frame, look: &Look) -> Resul
         let look_at = |width| answer(&twin, &looks::frame(&twin, &base, &thinned, Some(width)), Vec::new());
         let again = look_at(look.width)?;
         let doubts = |found: &Diagnosis| found.verdict != Verdict::NoDiscrepancy;
+        let left = above_noise(&without, &looks::frame(&twin, &base, &thinned, Some(look.width)));
         // A quieter look that doubts a machine by its own recording tells nothing small, nor one that only the next agrees with.
-        if quieter && (doubts(&again) || doubts(&look_at(2 * look.width + 1)?)) {
-            return Ok(small.clone());
-        }
+        let unsure = quieter && (doubts(&again) || doubts(&look_at(2 * look.width + 1)?));
         let named: Vec<Cause> = again.findings.iter().map(|finding| finding.effect.cause()).collect();
-        let beats = above_noise(&without, &looks::frame(&twin, &base, &thinned, Some(first.low_pass.width)));
-        let is_made =
-            |cause: &Cause| named.contains(cause) || band(*cause).is_some_and(|explains| beats > ALIKE * explains);
+        let is_made = |cause: &Cause| {
+            named.contains(cause)
+                || unsure && explains(*cause) < SMALL * left
+                || is_band(*cause) && explains(*cause) < left / ALIKE
+        };
         Ok(small.iter().copied().filter(is_made).collect())
     };
     let motions: Vec<_> = replays.recordings_of(&without).collect();
