@@ -14,6 +14,7 @@ use crate::analysis::statistics;
 use crate::machine::Cause;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// Terms of the sawtooth.
 const TERMS: usize = 3;
@@ -25,8 +26,9 @@ const OFFSETS: [f64; 4] = [0.07, 0.31, 0.53, 0.84];
 /// takes up to half off the sums.
 const SURELY: f64 = 2.0;
 
-/// Rows over which a servo's filters may spread its answer.
-const ROWS_OF_ANSWER: usize = 3;
+/// Rows before one that its answer is read off with it: the speeds of three rows, over which a servo's filters may spread it, each by a row
+/// before, and second differences of those.
+const ROWS_OF_ANSWER: usize = 5;
 
 /// What the encoder's grid makes in the torque balance through the inertia, RMS over the judged rows, drive's own unit, beyond
 /// what the second differences of a noise floor see of it: a speed at which rows meet the grid at nearly the same place makes a
@@ -92,7 +94,9 @@ fn answer(frame: &Frame) -> f64 {
     let fast = |values: &[f64], row: usize| values[row] - 2.0 * values[row - 1] + values[row - 2];
     let speed = |row: usize| per * (fast(&columns.position, row) - fast(&columns.position, row - 1));
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for &row in frame.kept.iter().filter(|row| **row >= ROWS_OF_ANSWER + 3) {
+    let before = |row: usize| frame.kept.partition_point(|kept| *kept < row);
+    let whole = |s: &Range<usize>| before((s.start + ROWS_OF_ANSWER).min(s.end))..before(s.end);
+    for &row in columns.stretches.iter().flat_map(|s| &frame.kept[whole(s)]) {
         let read = Vector3::from_fn(|late, _| speed(row - late));
         normal += read * read.transpose();
         right += read * fast(&columns.torque, row);

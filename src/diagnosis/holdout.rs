@@ -56,8 +56,7 @@ impl Holdout {
         let base = belief::base_alone(extended);
         let frame = Frame::new(&base, &self.thinned, None);
         let frame = if sampling.timing == Timing::Aligned { frame.aligned_by(sampling.shift_s) } else { frame };
-        let masses = extended.two_masses().unwrap_or_default();
-        let frame = masses.iter().fold(frame, Frame::after_first_swings);
+        let frame = frame.after_first_swings(extended);
         if !what_is_missing(&frame).is_empty() {
             return None;
         }

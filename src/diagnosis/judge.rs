@@ -276,16 +276,28 @@ pub fn is_coloured(bench: &Bench, fit: &Fit) -> bool {
     bench.frame.independent_rows(&rest).is_some_and(|rows| !show::is_tied(bench, fit, rows))
 }
 
-/// By how much a machine leaves more than noise of a frame; `None` where all may be noise.
-#[must_use]
-pub fn beyond_noise(axis: &Axis, frame: &Frame) -> Option<f64> {
+/// Asks something of what a machine leaves of a frame.
+pub fn left_by<R>(axis: &Axis, frame: &Frame, ask: impl FnOnce(&Bench, &Fit) -> R) -> R {
     let base = belief::base_alone(axis);
     let frame = frame.believing(&base);
     let bench = Bench::new(&frame, &Known::of(axis, &frame));
-    let left = bench.fit(Vec::new());
-    let excess = Excess::of(&bench, &left, &left);
-    let noise = excess.largest() <= TOLERABLE_IF_UNTIED || may_be_noise(&bench, &left, &excess);
-    (!noise).then(|| excess.largest())
+    ask(&bench, &bench.fit(Vec::new()))
+}
+
+/// By how much a machine leaves more than noise of a frame; `None` where all may be noise.
+#[must_use]
+pub fn beyond_noise(axis: &Axis, frame: &Frame) -> Option<f64> {
+    left_by(axis, frame, |bench, left| {
+        let excess = Excess::of(bench, left, left);
+        let noise = excess.largest() <= TOLERABLE_IF_UNTIED || may_be_noise(bench, left, &excess);
+        (!noise).then(|| excess.largest())
+    })
+}
+
+/// Mean square of what a fit leaves of the torque, and that of its noise.
+#[must_use]
+pub fn squares_and_noise(bench: &Bench, fit: &Fit) -> [f64; 2] {
+    [bench.certain_rms(fit)[0], bench.frame.floor(&bench.rest(fit)[0], true)].map(|rms| rms * rms)
 }
 
 /// Whether what is explained is mostly a curve over speed, or along the stroke, and is not that curve: too much of it is left.
@@ -407,11 +419,7 @@ impl Excess {
     /// What a machine leaves on a system of equations.
     #[must_use]
     pub fn of_machine(axis: &Axis, frame: &Frame) -> Excess {
-        let base = belief::base_alone(axis);
-        let frame = frame.believing(&base);
-        let bench = Bench::new(&frame, &Known::of(axis, &frame));
-        let left = bench.fit(Vec::new());
-        Excess::of(&bench, &left, &left)
+        left_by(axis, frame, |bench, left| Excess::of(bench, left, left))
     }
 
     /// Of the worse channel.

@@ -19,21 +19,6 @@ pub struct Look {
     pub is_final: bool,
 }
 
-/// A frame of a recording's columns without rows at which the table may still swing from before.
-pub fn frame<'a>(
-    recorded: &Recorded,
-    base: &'a crate::machine::Axis,
-    columns: &'a Columns,
-    width: Option<usize>,
-) -> Frame<'a> {
-    without_swings(recorded, Frame::new(base, columns, width))
-}
-
-fn without_swings<'a>(recorded: &Recorded, frame: Frame<'a>) -> Frame<'a> {
-    let masses = recorded.axis.two_masses().ok().flatten();
-    masses.iter().fold(frame, Frame::after_first_swings)
-}
-
 /// Looks at a recording of these columns, of which this is the first frame.
 ///
 /// # Errors
@@ -46,13 +31,13 @@ pub fn all(recorded: &Recorded, (columns, first): (&Columns, &Frame), notes: Vec
     const YIELDING: [Cause; 3] = [Cause::PreslidingFriction, Cause::DriveCompliance, Cause::Backlash];
     let told = found.findings.iter().any(|finding| YIELDING.contains(&finding.effect.cause()));
     let yields = !told && recorded.may_be_found(Cause::PreslidingFriction);
-    let look_wider = |look: &Frame| frame(recorded, &base, columns, Some(quiet::wider(look)));
+    let look_wider = |look: &Frame| Frame::new(&base, columns, Some(quiet::wider(look))).after_first_swings(axis);
     let (way, mut wider) = rayon::join(
         || yields.then(|| creep::way(first)).flatten(),
         || quiet::may_hide_more(&found).then(|| look_wider(first)),
     );
     if let Some(way) = way {
-        let yielding = without_swings(recorded, Frame::yielding_over(&base, columns, None, way));
+        let yielding = Frame::yielding_over(&base, columns, None, way).after_first_swings(axis);
         if creep::promises(&yielding, way, &found) {
             let again = answer(recorded, &yielding, notes.clone())?;
             if creep::is_over(way, again.findings.iter().map(|finding| finding.effect)) {

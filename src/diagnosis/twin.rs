@@ -7,12 +7,10 @@
 
 use super::belief;
 use super::by_loop::Replays;
-use super::fit::Bench;
 use super::frame::{Columns, Frame};
 use super::grids;
-use super::judge::Excess;
-use super::known::Known;
-use super::looks::{self, Look};
+use super::judge::{left_by, squares_and_noise};
+use super::looks::Look;
 use super::progress::Stopped;
 use super::verdict::{Diagnosis, Recorded, Verdict, answer};
 use super::whole::Whole;
@@ -34,13 +32,19 @@ const SEED: u64 = 1979;
 ///
 /// # Errors
 /// [`Stopped`] when the watch's caller said so.
-pub fn made_by_sensors(recorded: &Recorded, first: &Frame, look: &Look) -> Result<Vec<Cause>, Stopped> {
+pub fn made_by_sensors(
+    recorded: &Recorded,
+    (columns, first): (&Columns, &Frame),
+    look: &Look,
+) -> Result<Vec<Cause>, Stopped> {
     let (axis, found) = (recorded.axis, &look.found);
-    let base = belief::base_alone(axis);
+    if found.findings.is_empty() {
+        return Ok(Vec::new());
+    }
     let quieter = look.width != first.low_pass.width;
-    let columns = recorded.whole.columns.clone().thinned();
-    let heard = if quieter { &looks::frame(recorded, &base, &columns, Some(look.width)) } else { first };
-    let variance = (1.0 + Excess::of_machine(axis, heard).of_channel(0)) * floor(axis, heard).powi(2);
+    let base = belief::base_alone(axis);
+    let wide = quieter.then(|| Frame::new(&base, columns, Some(look.width)).after_first_swings(axis));
+    let [variance, _] = left_by(axis, wide.as_ref().unwrap_or(first), squares_and_noise);
     let explains = |cause: Cause| {
         let findings = found.findings.iter().filter(|finding| finding.effect.cause() == cause);
         findings.map(|finding| finding.share).sum::<f64>() * variance
@@ -60,16 +64,18 @@ pub fn made_by_sensors(recorded: &Recorded, first: &Frame, look: &Look) -> Resul
     let replays = Replays::new(recorded.whole, found.replay.as_ref(), recorded.watch);
     let Some(replays) = replays else { return Ok(Vec::new()) };
     let base = belief::base_alone(&without);
-    let noise = floor(&found.extended, first);
+    let [_, noise] = left_by(&found.extended, first, squares_and_noise);
     let made_in = |motion: &[Vec<f64>; 2]| -> Result<Vec<Cause>, Stopped> {
         let columns = noisy(&without, recorded.whole.columns, motion.clone(), (first.low_pass.width, noise));
         let whole = Whole::new(&without, &columns);
         let twin = Recorded { axis: &without, belief: &without, whole: &whole, holdout: None, ..*recorded };
         let thinned = columns.clone().thinned();
-        let look_at = |width| answer(&twin, &looks::frame(&twin, &base, &thinned, Some(width)), Vec::new());
+        let frame = |width| Frame::new(&base, &thinned, Some(width)).after_first_swings(&without);
+        let look_at = |width| answer(&twin, &frame(width), Vec::new());
         let again = look_at(look.width)?;
         let doubts = |found: &Diagnosis| found.verdict != Verdict::NoDiscrepancy;
-        let left = above_noise(&without, &looks::frame(&twin, &base, &thinned, Some(look.width)));
+        let [squares, noise] = left_by(&without, &frame(look.width), squares_and_noise);
+        let left = squares - noise;
         // A quieter look that doubts a machine by its own recording tells nothing small, nor one that only the next agrees with.
         let unsure = quieter && (doubts(&again) || doubts(&look_at(2 * look.width + 1)?));
         let named: Vec<Cause> = again.findings.iter().map(|finding| finding.effect.cause()).collect();
@@ -102,27 +108,16 @@ pub fn says(made: &[Cause]) -> String {
     )
 }
 
-/// Variance above the noise floor that a machine leaves of the torque.
-fn above_noise(machine: &Axis, frame: &Frame) -> f64 {
-    Excess::of_machine(machine, frame).of_channel(0) * floor(machine, frame).powi(2)
-}
-
-/// The noise floor of what a machine leaves of the torque.
-fn floor(machine: &Axis, frame: &Frame) -> f64 {
-    let base = belief::base_alone(machine);
-    let frame = frame.believing(&base);
-    let bench = Bench::new(&frame, &Known::of(machine, &frame));
-    frame.floor(&bench.rest(&bench.fit(Vec::new()))[0], true)
-}
-
-/// Columns of a motion, the torque with as much noise as makes `noise` through a low-pass of this width together with what the encoder makes.
+/// Columns of a motion, the torque with as much noise as makes `noise` (a mean square) through a low-pass of this width together with what the
+/// encoder makes.
 fn noisy(machine: &Axis, like: &Columns, [position, torque]: [Vec<f64>; 2], (width, noise): (usize, f64)) -> Columns {
     let base = belief::base_alone(machine);
     let mut columns = like.with_motion(position, torque);
     columns.command = like.command.as_ref().map(|command| command[..columns.position.len()].to_vec());
     let thinned = columns.clone().thinned();
     let frame = Frame::new(&base, &thinned, Some(width));
-    let missing = (noise.powi(2) - floor(machine, &frame).powi(2)).max(0.0).sqrt() / frame.of_white_noise();
+    let [_, own] = left_by(machine, &frame, squares_and_noise);
+    let missing = (noise - own).max(0.0).sqrt() / frame.of_white_noise();
     let deviation = missing * (thinned.period_s / columns.period_s).sqrt();
     let mut random = Noise::new(SEED);
     columns.torque.iter_mut().for_each(|torque| *torque += random.normal(deviation));

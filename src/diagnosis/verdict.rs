@@ -121,16 +121,15 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
         Ok(columns) => (columns, recording.notes.clone()),
         Err(why) => return Ok(insufficient(axis, vec![why.to_string()])),
     };
-    let masses = match axis.two_masses() {
-        Ok(masses) => masses,
-        Err(why) => return Ok(insufficient(axis, vec![format!("a machine file that holds together: {why}")])),
-    };
+    if let Err(why) = axis.two_masses() {
+        return Ok(insufficient(axis, vec![format!("a machine file that holds together: {why}")]));
+    }
     let mut columns = whole.clone().thinned();
     if !belief::parts_table(axis) {
         columns = columns.without_repeated_scale();
     }
     let base = belief::base_alone(axis);
-    let first = masses.iter().fold(Frame::new(&base, &columns, None), Frame::after_first_swings);
+    let first = Frame::new(&base, &columns, None).after_first_swings(axis);
     let missing = what_is_missing(&first);
     if !missing.is_empty() {
         return Ok(Diagnosis { notes, ..insufficient(axis, missing) });
@@ -142,7 +141,7 @@ fn answer_to(axis: &Axis, recording: &Excerpt, holdout: Option<&Excerpt>, watch:
     if look.is_final {
         return watch.at(1.0, "done").map(|()| look.found);
     }
-    let made = twin::made_by_sensors(&recorded, &first, &look)?;
+    let made = twin::made_by_sensors(&recorded, (&columns, &first), &look)?;
     if !made.is_empty() {
         let except = Recorded { except: &made, ..recorded };
         look = looks::all(&except, (&columns, &first), notes)?;

@@ -12,7 +12,7 @@ use super::replays::Replays;
 use crate::diagnosis::belief;
 use crate::diagnosis::fit::Bench;
 use crate::diagnosis::frame::{Columns, Frame};
-use crate::diagnosis::judge::{Excess, LITTLE_LEFT, TOLERABLE_EXCESS};
+use crate::diagnosis::judge::{Excess, LITTLE_LEFT, TOLERABLE_EXCESS, squares_and_noise};
 use crate::diagnosis::known::Known;
 use crate::diagnosis::quiet;
 use crate::diagnosis::show::{self, Coordinate};
@@ -47,8 +47,7 @@ impl Leaves {
         let bench = Bench::new(frame, &Known::of(machine, frame));
         let left = bench.fit(Vec::new());
         let certain = &left.residual[..bench.rows];
-        let squares = bench.certain_rms(&left)[0].powi(2);
-        let noise = frame.floor(&bench.rest(&left)[0], true).powi(2);
+        let [squares, noise] = squares_and_noise(&bench, &left);
         let rows = frame.independent_rows(certain).unwrap_or(bench.rows as f64);
         let goes_with = WHERE.map(|coordinate| squares * show::share_of(frame, certain, coordinate, rows));
         Self { squares, noise, goes_with, rows }
@@ -97,14 +96,12 @@ impl<'i> Itself<'i> {
 
     /// With what more goes than of recordings of its own, and the share of the variance that does, of the quietest look that shows it.
     fn lives_in(&self, frame: &Frame) -> Option<(Coordinate, f64)> {
-        let masses = self.machine.two_masses().ok()?;
         let columns = self.replays.whole.columns.clone().thinned();
         let mut look = frame.believing(&self.base);
         let mut shown = None;
         for turn in 0..LOOKS {
             if turn > 0 {
-                let wide = Frame::new(&self.base, &columns, Some(quiet::wider(&look)));
-                look = masses.iter().fold(wide, Frame::after_first_swings);
+                look = Frame::new(&self.base, &columns, Some(quiet::wider(&look))).after_first_swings(self.machine);
                 if !what_is_missing(&look).is_empty() {
                     break;
                 }

@@ -1,7 +1,7 @@
 //! What an elastic drive still swings after a stretch of rows has begun.
 
 use super::{BLOCKS, Frame, grids};
-use crate::machine::TwoMasses;
+use crate::machine::{Axis, TwoMasses};
 
 /// Time constants until a free swing has come to a hundredth and a half of its size.
 const FREE_SWINGS: f64 = 4.2;
@@ -10,12 +10,16 @@ const MOST_OF_STRETCH: f64 = 0.25;
 
 impl Frame<'_> {
     /// The same rows without what an elastic drive still swings after a stretch has begun: which way it was wound up then, nobody knows.
-    /// Its table swings freely until damping has taken that off, or for a quarter of the stretch.
+    /// Its table swings freely until damping has taken that off, or for a quarter of the stretch. All of them where the axis has no such drive.
     #[must_use]
-    pub fn after_first_swings(mut self, masses: &TwoMasses) -> Self {
-        if masses.clearance > 0.0 {
-            return self;
+    pub fn after_first_swings(self, axis: &Axis) -> Self {
+        match axis.two_masses() {
+            Ok(Some(masses)) if !(masses.clearance > 0.0) => self.without_swings_of(&masses),
+            _ => self,
         }
+    }
+
+    fn without_swings_of(mut self, masses: &TwoMasses) -> Self {
         let swinging_s = FREE_SWINGS * 2.0 * masses.table_inertia / masses.damping.max(1e-300);
         let stretches = self.columns.stretches.iter().map(|s| (s.start, s.len()));
         let ends: Vec<(usize, usize)> = stretches
