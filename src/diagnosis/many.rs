@@ -2,6 +2,8 @@
 //! done in a third of the time.
 
 use std::f64::consts::{FRAC_1_SQRT_2, LN_2, LOG2_E, TAU};
+use std::ops::{Add, Mul, Sub};
+use wide::f64x2;
 
 /// Runs a loop with the widest registers that this processor has. Each number comes out the same on every processor: only how
 /// many are worked out at once differs.
@@ -135,10 +137,56 @@ pub fn sine_cosine(turns: f64) -> (f64, f64) {
     (sine(folded), sine(0.25 - rest.abs()))
 }
 
+/// One number, or several that one instruction handles.
+pub trait Numbers: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+    /// All the same.
+    fn splat(value: f64) -> Self;
+
+    /// Each or a bound, whichever is smaller.
+    fn at_most(self, bound: f64) -> Self;
+
+    /// 2ⁿ by the whole number n in the last bits of each.
+    fn power_of_last_bits(self) -> Self;
+}
+
+impl Numbers for f64 {
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn at_most(self, bound: f64) -> Self {
+        if self < bound { self } else { bound }
+    }
+
+    #[inline(always)]
+    fn power_of_last_bits(self) -> Self {
+        f64::from_bits((self.to_bits() << 52).wrapping_add(1.0f64.to_bits()))
+    }
+}
+
+impl Numbers for f64x2 {
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        f64x2::splat(value)
+    }
+
+    #[inline(always)]
+    fn at_most(self, bound: f64) -> Self {
+        self.fast_min(f64x2::splat(bound))
+    }
+
+    #[inline(always)]
+    fn power_of_last_bits(self) -> Self {
+        f64x2::new(self.to_array().map(f64::power_of_last_bits))
+    }
+}
+
 /// e^−x for x from 0 on, to 1e-9; the library's are exact to the last bit and take several times as long.
 #[inline(always)]
-pub fn decay(x: f64) -> f64 {
-    two_to(-LOG2_E * if x < 700.0 { x } else { 700.0 })
+pub fn decay<T: Numbers>(x: T) -> T {
+    two_to(x.at_most(700.0) * T::splat(-LOG2_E))
 }
 
 /// A power of each, from 0 on, to 1e-8; of what is less than 1e-300 that of 1e-300.
@@ -157,15 +205,15 @@ pub fn to_the_power(values: &mut [f64], exponent: f64) {
 
 /// 2^y for y within ±1020.
 #[inline(always)]
-fn two_to(y: f64) -> f64 {
+fn two_to<T: Numbers>(y: T) -> T {
     /// Added to a number, it leaves the nearest whole one in the last bits.
     const WHOLE: f64 = 6_755_399_441_055_744.0;
     // 2ⁿ·eʳ with r within half of ln 2.
-    let n = y + WHOLE;
-    let power = f64::from_bits((n.to_bits() << 52).wrapping_add(1.0f64.to_bits()));
-    let r = (y - (n - WHOLE)) * LN_2;
-    let tail = 1.0 / 120.0 + r * (1.0 / 720.0 + r * (1.0 / 5040.0 + r / 40_320.0));
-    power * (1.0 + r * (1.0 + r * (0.5 + r * (1.0 / 6.0 + r * (1.0 / 24.0 + r * tail)))))
+    let n = y + T::splat(WHOLE);
+    let r = (y - (n - T::splat(WHOLE))) * T::splat(LN_2);
+    let factorials = [1.0 / 5040.0, 1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0];
+    let series = factorials.into_iter().fold(T::splat(1.0 / 40_320.0), |sum, term| T::splat(term) + r * sum);
+    n.power_of_last_bits() * series
 }
 
 /// log₂ x of a number from 1e-300 on, to 1e-10.

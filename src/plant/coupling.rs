@@ -9,6 +9,7 @@
 //! before a wall at √(k/J₂) and with less damping.
 
 use crate::machine::TwoMasses;
+use std::ops::{Add, Mul, Sub};
 
 /// Torque on the table (and against the motor) at a wind-up and its rate.
 #[must_use]
@@ -48,13 +49,17 @@ impl Giving {
         Self { corner: h * corner, square: h * corner * corner, kept: 1.0 / (1.0 + 1.4 * h * corner), h }
     }
 
-    /// z, ż and τ̄ after a step in which the link carries `torque`; `mobility` is the step over the motor's inertia.
+    /// z, ż and τ̄ after a step in which the link carries `torque`; `mobility` is the step over the motor's inertia. Of one motor, or of
+    /// several side by side.
     #[must_use]
     #[inline(always)]
-    pub fn step(&self, [z, speed, answered]: [f64; 3], torque: f64, mobility: f64) -> [f64; 3] {
+    pub fn step<T>(&self, [z, speed, answered]: [T; 3], torque: T, mobility: T) -> [T; 3]
+    where
+        T: Copy + Add<Output = T> + Sub<Output = T> + Mul<Output = T> + Mul<f64, Output = T>,
+    {
         let beyond = torque - answered;
-        let speed = self.kept * (speed - mobility * beyond - self.square * z);
-        [z + self.h * speed, speed, answered + self.corner * beyond]
+        let speed = (speed - mobility * beyond - z * self.square) * self.kept;
+        [z + speed * self.h, speed, answered + beyond * self.corner]
     }
 }
 

@@ -10,6 +10,7 @@
 
 mod bristles;
 mod flanks;
+mod lanes;
 mod resistance;
 mod spring;
 
@@ -20,6 +21,7 @@ use crate::diagnosis::many::widest;
 use crate::diagnosis::sampling::NUMEROV;
 use crate::machine::TwoMasses;
 use bristles::Bristles;
+use lanes::{Lanes, Which};
 use rayon::prelude::*;
 use resistance::{Alike, Each, Resisted};
 use spring::MOST_STEPS;
@@ -119,37 +121,28 @@ thread_local! {
     static ROOM: RefCell<[Vec<f64>; 2]> = const { RefCell::new([Vec::new(), Vec::new()]) };
 }
 
-#[inline(always)]
-fn lanes<const N: usize>(mut value: impl FnMut(usize) -> f64) -> [f64; N] {
-    // A plain loop is inlined at any length, `array::from_fn` is not.
-    let mut lanes = [0.0; N];
-    for l in 0..N {
-        lanes[l] = value(l);
-    }
-    lanes
-}
-
 /// Tables behind one motor that moves as measured; motor's coordinate.
 struct Tables<'a, const N: usize, R> {
     frame: &'a Frame<'a>,
     resistance: R,
-    inertia: [f64; N],
-    motor_inertia: [f64; N],
+    inertia: Lanes<N>,
     /// Share of friction.
-    share: [f64; N],
-    /// Half the clearance.
-    half: [f64; N],
+    share: Lanes<N>,
+    /// Half the clearance, and what the spring would carry over that.
+    half: Lanes<N>,
+    slack: Lanes<N>,
     /// The spring as the steps need it, and how much softer that is than the real one.
-    stiffness: [f64; N],
-    softer: [f64; N],
-    damping: [f64; N],
+    stiffness: Lanes<N>,
+    softer: Lanes<N>,
+    damping: Lanes<N>,
     /// Pieces between two rows, steps of all of them, and the time of each step, s.
     pieces: usize,
     steps: usize,
     step_s: f64,
-    /// What a step makes of a torque and of the speed there is.
-    mobility: [f64; N],
-    kept: [f64; N],
+    /// What a step makes of a torque on the table, and on a motor that gives way to it, and of the speed there is.
+    mobility: Lanes<N>,
+    motor_mobility: Lanes<N>,
+    kept: Lanes<N>,
     /// How friction builds up on the tables' own way, of a table with all of it, where a step is short beside that way.
     bristles: Option<Bristles<N>>,
     /// By what each is shaken of what its motor holds and of that a quarter of a period later, if any is. Flanks are not: what shakes their table is
@@ -159,14 +152,14 @@ struct Tables<'a, const N: usize, R> {
     /// Whether there is a dead zone: flanks push and never pull.
     flanks: bool,
     /// Behind flanks that meet so softly that they swing for long: those never move as one with the motor.
-    swings: [bool; N],
+    swings: Which<N>,
 }
 
 /// What resists tables at a row: the load of each and its largest dry friction, and that of a table with all of it.
 struct Resisting<const N: usize> {
-    load: [f64; N],
-    friction: [f64; N],
-    level: [f64; N],
+    load: Lanes<N>,
+    friction: Lanes<N>,
+    level: Lanes<N>,
 }
 
 /// The way of the motor from a row to the next: value and derivatives of the cubic by shares of the time between them.
@@ -195,23 +188,26 @@ impl Way {
 impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
     fn new(frame: &'a Frame<'a>, resistance: R, masses: &[TwoMasses]) -> Self {
         // Lanes without a table of their own repeat the last.
-        let of = |value: fn(&TwoMasses) -> f64| lanes(|l| masses.get(l).or(masses.last()).map_or(1.0, value));
+        let of = |value: fn(&TwoMasses) -> f64| Lanes::each(|l| masses.get(l).or(masses.last()).map_or(1.0, value));
         let share = of(|m| m.table_friction_share);
         let fastest = masses.iter().map(|m| (m.stiffness / m.table_inertia).sqrt().max(m.damping / m.table_inertia));
         let flanks = masses.iter().any(|m| m.clearance > 0.0);
         let radians = frame.columns.period_s * fastest.fold(0.0, f64::max);
-        let swings =
-            of(|m| 2.0 * m.table_inertia / m.damping.max(1e-300)).map(|constant_s| SWINGS * constant_s > LONG_S);
+        let constant_s = of(|m| 2.0 * m.table_inertia / m.damping.max(1e-300));
+        let swings = (constant_s * SWINGS).above(Lanes::splat(LONG_S));
         let steps = (radians / STEP_RAD[usize::from(flanks)]).ceil().clamp(1.0, 1000.0);
         let pieces = if flanks { 1.0 } else { (steps / MOST_STEPS).ceil() };
         let steps = pieces * (steps / pieces).ceil();
         let step_s = frame.columns.period_s / steps;
         let inertia = of(|m| m.table_inertia);
-        let mobility = inertia.map(|j| step_s / j);
+        let mobility = Lanes::splat(step_s) / inertia;
         // In steps of h a spring swings at ω when it is softer by (sin(ωh/2)/(ωh/2))² (leapfrog integration).
-        let swing = of(|m| (m.stiffness / m.table_inertia).sqrt()).map(|omega| (0.5 * step_s * omega).clamp(1e-9, 1.0));
-        let softer = swing.map(|half| (half.sin() / half).powi(2));
-        let stiffness = of(|m| m.stiffness);
+        let swing = of(|m| (m.stiffness / m.table_inertia).sqrt());
+        let softer = Lanes::each(|l| {
+            let half = (0.5 * step_s * swing.of(l)).clamp(1e-9, 1.0);
+            (half.sin() / half).powi(2)
+        });
+        let (stiffness, half) = (of(|m| m.stiffness) * softer, of(|m| 0.5 * m.clearance));
         // On a bristle that is stiffer than its steps can follow friction is there at once.
         let lightest =
             masses.iter().map(|m| m.table_inertia / m.table_friction_share.max(1e-9)).fold(f64::MAX, f64::min);
@@ -221,7 +217,7 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
         let of_lane = |l: usize| masses.get(l).or(masses.last()).filter(|_| !flanks);
         let shaken = |(l, masses): (usize, &TwoMasses)| {
             let waves = resistance.lane(l).shaking.iter();
-            waves.map(|wave| wave.at_the_table(masses, viscous[l])).collect()
+            waves.map(|wave| wave.at_the_table(masses, viscous.of(l))).collect()
         };
         let shaken: [Vec<_>; N] =
             std::array::from_fn(|l| of_lane(l).map_or_else(Vec::new, |masses| shaken((l, masses))));
@@ -231,17 +227,19 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
             frame,
             resistance,
             inertia,
-            motor_inertia: of(|m| m.motor_inertia),
             share,
-            half: of(|m| 0.5 * m.clearance),
+            half,
+            slack: stiffness * half,
             softer,
-            stiffness: lanes(|l| stiffness[l] * softer[l]),
+            stiffness,
             damping: of(|m| m.damping),
             pieces: pieces as usize,
             steps: steps as usize,
             step_s,
             mobility,
-            kept: lanes(|l| 1.0 - mobility[l] * share[l] * viscous[l]),
+            // What swings slower than the rows come is in the motor's measured way.
+            motor_mobility: (!swings).keep(Lanes::splat(step_s) / of(|m| m.motor_inertia)),
+            kept: Lanes::splat(1.0) - mobility * share * viscous,
             bristles: resistance
                 .bristles()
                 .filter(|bristles| bristles.iter().all(swings_slower))
@@ -296,9 +294,9 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
 
     /// What resists the motion of a rigid axis at a row, by a speed: friction of which the tables have their share, and load.
     #[inline(always)]
-    fn resisting(&self, i: usize, speed: f64) -> ([f64; N], [f64; N]) {
+    fn resisting(&self, i: usize, speed: f64) -> [Lanes<N>; 2] {
         let speed = speed * self.frame.unit;
-        (self.resistance.each(|r| r.dry[i] + r.viscous * speed + r.even[i]), self.resistance.each(|r| r.load[i]))
+        [self.resistance.each(|r| r.dry[i] + r.viscous * speed + r.even[i]), self.resistance.each(|r| r.load[i])]
     }
 
     /// What resists the tables at a row.
@@ -310,22 +308,21 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
             let waves = self.resistance.lane(l).shaking.iter().zip(&self.shaken[l]);
             waves.map(|(wave, [held, quarter])| held * wave.held[i] + quarter * wave.quarter[i]).sum::<f64>()
         };
-        let shaking: [f64; N] = if self.is_shaken { lanes(shaking) } else { [0.0; N] };
-        let friction = lanes(|l| self.share[l] * level[l]);
-        Resisting { load: lanes(|l| load[l] + shaking[l] + self.share[l] * even[l]), friction, level }
+        let load = if self.is_shaken { load + Lanes::each(shaking) } else { load };
+        Resisting { load: load + self.share * even, friction: self.share * level, level }
     }
 
     /// Torque that the link of a rigid axis carries at a row.
     #[inline(always)]
-    fn carried(&self, i: usize) -> [f64; N] {
+    fn carried(&self, i: usize) -> Lanes<N> {
         let acceleration = self.frame.a[i] * self.frame.unit;
-        let (friction, load) = self.resisting(i, self.frame.v[i]);
-        lanes(|l| self.inertia[l] * acceleration + self.share[l] * friction[l] + load[l])
+        let [friction, load] = self.resisting(i, self.frame.v[i]);
+        self.inertia * acceleration + self.share * friction + load
     }
 
     /// Torque that the links carry where rows begin: that of a rigid axis, or, of an axis that rests there, what the motor gives as far
     /// as the friction of the resting table can hold it against the load. Friction that builds up has not yet, and holds nothing.
-    fn carried_first(&self, rows: Range<usize>) -> [f64; N] {
+    fn carried_first(&self, rows: Range<usize>) -> Lanes<N> {
         let (first, frame) = (rows.start, self.frame);
         let resting = rows.take_while(|i| frame.direction[*i] == 0.0).map(|i| frame.columns.torque[i]);
         let (count, sum) = resting.fold((0.0, 0.0), |(count, sum), torque| (count + 1.0, sum + torque));
@@ -333,24 +330,22 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
             return self.carried(first);
         }
         let Resisting { load, friction, .. } = self.resisting_tables(first);
-        lanes(|l| larger(smaller(sum / count, load[l] + friction[l]), load[l] - friction[l]))
+        Lanes::splat(sum / count).smaller(load + friction).larger(load - friction)
     }
 
     /// What the link of a rigid axis carries between a row and the next, shared between them by how near it acts: the
     /// triangular mean of the acceleration is a second difference, that of friction is taken as the base takes it.
     #[inline(always)]
-    fn rigid(&self, i: usize) -> [[f64; N]; 2] {
+    fn rigid(&self, i: usize) -> [Lanes<N>; 2] {
         let (unit, span) = (self.frame.unit, self.frame.columns.period_s);
         let step = self.frame.columns.position[i + 1] - self.frame.columns.position[i];
         let speed = |i: usize| self.frame.raw_speed[i];
-        let ((here, load), (next, next_load)) = (self.resisting(i, speed(i)), self.resisting(i + 1, speed(i + 1)));
+        let ([here, load], [next, next_load]) = (self.resisting(i, speed(i)), self.resisting(i + 1, speed(i + 1)));
         let [side, middle] = [NUMEROV[0], 0.5 * NUMEROV[1]];
         let share = |acceleration: f64, [of_here, of_next]: [f64; 2]| {
-            lanes(|l| {
-                let friction = of_here * here[l] + of_next * next[l];
-                let load = of_here * load[l] + of_next * next_load[l];
-                self.inertia[l] * acceleration * unit + self.share[l] * friction + load
-            })
+            let friction = here * of_here + next * of_next;
+            let load = load * of_here + next_load * of_next;
+            self.inertia * acceleration * unit + self.share * friction + load
         };
         [
             share((step - span * speed(i)) / (span * span), [middle, side]),
@@ -368,16 +363,4 @@ impl<'a, const N: usize, R: Resisted<N>> Tables<'a, N, R> {
         let ((q0, d0), (q1, d1)) = (at(i), at(i + 1));
         Way { at: q0, rate: d0, bend: 3.0 * (q1 - q0) - 2.0 * d0 - d1, twist: 2.0 * (q0 - q1) + d0 + d1 }
     }
-}
-
-/// The larger of two numbers; unlike the library's, which minds NaN, one instruction.
-#[inline(always)]
-fn larger(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
-}
-
-/// The smaller of two numbers, likewise.
-#[inline(always)]
-fn smaller(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
 }

@@ -1,8 +1,7 @@
 //! Friction that builds up on the ways of several tables at once: a plain bristle is a few products in all lanes of a register, by the
 //! law of [`Friction::moved`]; what builds up by another law goes table by table.
 
-use super::{lanes, larger};
-use crate::diagnosis::many::decay;
+use super::{Lanes, Which};
 use crate::plant::friction::{Friction, SLIPS};
 
 /// How friction has built up on the way of each table.
@@ -11,9 +10,9 @@ pub(super) enum Bristles<const N: usize> {
     /// Dahl's bristle of each: its torque and its stiffness.
     Plain {
         /// Torque.
-        force: [f64; N],
+        force: Lanes<N>,
         /// Stiffness.
-        stiffness: [f64; N],
+        stiffness: Lanes<N>,
     },
     /// By any other law.
     Other([Friction; N]),
@@ -23,7 +22,7 @@ impl<const N: usize> Bristles<N> {
     /// At rest.
     pub(super) fn new(at_rest: [Friction; N]) -> Self {
         if at_rest.iter().all(Friction::is_plain_bristle) {
-            Self::Plain { force: [0.0; N], stiffness: at_rest.map(|friction| friction.bristle.stiffness) }
+            Self::Plain { force: Lanes::splat(0.0), stiffness: Lanes::each(|l| at_rest[l].bristle.stiffness) }
         } else {
             Self::Other(at_rest)
         }
@@ -31,49 +30,44 @@ impl<const N: usize> Bristles<N> {
 
     /// Torque after each was moved so far at its level.
     #[inline(always)]
-    pub(super) fn moved(&mut self, way: [f64; N], level: [f64; N]) -> [f64; N] {
+    pub(super) fn moved(&mut self, way: Lanes<N>, level: Lanes<N>) -> Lanes<N> {
         match self {
             Self::Plain { force, stiffness } => {
-                *force = built(force, stiffness, way, level);
+                *force = built(*force, *stiffness, way, level);
                 *force
             }
-            Self::Other(frictions) => lanes(|l| frictions[l].moved(way[l], level[l])),
+            Self::Other(frictions) => Lanes::each(|l| frictions[l].moved(way.of(l), level.of(l))),
         }
     }
 
     /// Torque of each as long as it goes on one way, where all have built up as far as they will: that of dry friction.
     #[inline(always)]
-    pub(super) fn slipping(&self, speed: [f64; N], level: [f64; N]) -> Option<[f64; N]> {
-        let mut slips = true;
-        let mut torque = [0.0; N];
-        for l in 0..N {
-            let force = match self {
-                Self::Plain { force, .. } => force[l],
-                Self::Other(frictions) => frictions[l].bristle.force,
-            };
-            torque[l] = level[l].copysign(speed[l]);
-            slips &= force * 1.0f64.copysign(speed[l]) >= SLIPS * level[l];
-        }
-        slips.then_some(torque)
+    pub(super) fn slipping(&self, speed: Lanes<N>, level: Lanes<N>) -> Option<Lanes<N>> {
+        let force = match self {
+            Self::Plain { force, .. } => *force,
+            Self::Other(frictions) => Lanes::each(|l| frictions[l].bristle.force),
+        };
+        let slips = (force * speed.sign()).reach(level * SLIPS);
+        slips.all().then(|| level.copysign(speed))
     }
 
     /// Torque after each was moved so far at its level, with the bristles left where they are.
     #[inline(always)]
-    pub(super) fn after(&self, way: [f64; N], level: [f64; N]) -> [f64; N] {
+    pub(super) fn after(&self, way: Lanes<N>, level: Lanes<N>) -> Lanes<N> {
         match self {
-            Self::Plain { force, stiffness } => built(force, stiffness, way, level),
-            Self::Other(frictions) => lanes(|l| frictions[l].after(way[l], level[l])),
+            Self::Plain { force, stiffness } => built(*force, *stiffness, way, level),
+            Self::Other(frictions) => Lanes::each(|l| frictions[l].after(way.of(l), level.of(l))),
         }
     }
 
     /// All moved alike, of which so many differ; the rest go as the first.
     #[inline(always)]
-    pub(super) fn moved_together(&mut self, way: f64, level: [f64; N], distinct: usize) {
+    pub(super) fn moved_together(&mut self, way: f64, level: Lanes<N>, distinct: usize) {
         match self {
-            Self::Plain { .. } => _ = self.moved([way; N], level),
+            Self::Plain { .. } => _ = self.moved(Lanes::splat(way), level),
             Self::Other(frictions) => {
                 for l in 0..distinct {
-                    frictions[l].moved(way, level[l]);
+                    frictions[l].moved(way, level.of(l));
                 }
                 for l in distinct..N {
                     frictions[l] = frictions[0];
@@ -82,12 +76,14 @@ impl<const N: usize> Bristles<N> {
         }
     }
 
-    /// Makes that of one table what it is in another.
+    /// Makes those of some tables what they are in others.
     #[inline(always)]
-    pub(super) fn take(&mut self, l: usize, from: &Self) {
+    pub(super) fn take(&mut self, these: Which<N>, from: &Self) {
         match (self, from) {
-            (Self::Plain { force, .. }, Self::Plain { force: other, .. }) => force[l] = other[l],
-            (Self::Other(frictions), Self::Other(others)) => frictions[l] = others[l],
+            (Self::Plain { force, .. }, Self::Plain { force: other, .. }) => *force = these.choose(*other, *force),
+            (Self::Other(frictions), Self::Other(others)) => {
+                (0..N).filter(|l| these.of(*l)).for_each(|l| frictions[l] = others[l]);
+            }
             _ => {}
         }
     }
@@ -95,14 +91,13 @@ impl<const N: usize> Bristles<N> {
 
 /// Torque of plain bristles: of the way from −L to L a share is left that falls as e^−σ·|q|/L.
 #[inline(always)]
-fn built<const N: usize>(force: &[f64; N], stiffness: &[f64; N], way: [f64; N], level: [f64; N]) -> [f64; N] {
-    lanes(|l| {
-        let per_level = if level[l] > 0.0 { 1.0 / level[l] } else { 0.0 };
-        let side = 1.0f64.copysign(way[l]);
-        // A level that has fallen below the torque holds no more than itself.
-        let left = larger(0.5 - 0.5 * force[l] * side * per_level, 0.0);
-        level[l] * side * (1.0 - 2.0 * left * decay(stiffness[l] * way[l].abs() * per_level))
-    })
+fn built<const N: usize>(force: Lanes<N>, stiffness: Lanes<N>, way: Lanes<N>, level: Lanes<N>) -> Lanes<N> {
+    let (nothing, half, one) = (Lanes::splat(0.0), Lanes::splat(0.5), Lanes::splat(1.0));
+    let per_level = level.above(nothing).keep(one / level);
+    let side = way.sign();
+    // A level that has fallen below the torque holds no more than itself.
+    let left = (half - force * side * per_level * 0.5).larger(nothing);
+    level * side * (one - left * (stiffness * way.abs() * per_level).decay() * 2.0)
 }
 
 #[cfg(test)]
@@ -122,14 +117,14 @@ mod tests {
             let mut noise = Noise::new(5);
             for step in 0..2000 {
                 let mut random = || noise.uniform() - 0.5;
-                let way: [f64; 4] = lanes(|_| 0.1 * random());
+                let way: Lanes<4> = Lanes::each(|_| 0.1 * random());
                 // A level of nothing holds nothing.
-                let level: [f64; 4] = lanes(|_| if step % 97 == 0 { 0.0 } else { 1.0 + random() });
-                let ahead = together.after(way, level);
-                let moved = together.moved(way, level);
+                let level: Lanes<4> = Lanes::each(|_| if step % 97 == 0 { 0.0 } else { 1.0 + random() });
+                let ahead = together.after(way, level).to_array();
+                let moved = together.moved(way, level).to_array();
                 assert_eq!(ahead, moved);
                 for l in 0..4 {
-                    let own = each[l].moved(way[l], level[l]);
+                    let own = each[l].moved(way.of(l), level.of(l));
                     assert!((own - moved[l]).abs() < 1e-8, "{law:?}, step {step}: {own} is not {}", moved[l]);
                 }
             }
@@ -143,17 +138,20 @@ mod tests {
             let each: [Friction; 4] = lanes_of(|l| Friction::new(50.0 + 20.0 * l as f64, law));
             let mut bristles = Bristles::new(each);
             let (level, forward, one_turns) = ([1.0, 2.0, 0.5, 1.0], [1.0; 4], [1.0, 1.0, -1.0, 1.0]);
-            assert_eq!(bristles.slipping(forward, level), None, "{law:?}");
+            let of = |array: [f64; 4]| Lanes::each(|l| array[l]);
+            let slipping =
+                |bristles: &Bristles<4>, speed, level| bristles.slipping(of(speed), of(level)).map(Lanes::to_array);
+            assert_eq!(slipping(&bristles, forward, level), None, "{law:?}");
             for _ in 0..20_000 {
-                bristles.moved([0.01; 4], level);
+                bristles.moved(of([0.01; 4]), of(level));
             }
-            assert_eq!(bristles.slipping(forward, level), Some(level), "{law:?}");
+            assert_eq!(slipping(&bristles, forward, level), Some(level), "{law:?}");
             // What dry friction makes in place of the bristles, these would have made.
-            let moved = bristles.after([0.01; 4], level);
+            let moved = bristles.after(of([0.01; 4]), of(level)).to_array();
             assert!(moved.iter().zip(level).all(|(moved, level)| (moved / level - 1.0).abs() < 2.0 * (1.0 - SLIPS)));
-            assert_eq!(bristles.slipping(one_turns, level), None, "{law:?}");
+            assert_eq!(slipping(&bristles, one_turns, level), None, "{law:?}");
             // A level that has risen has yet to be reached.
-            assert_eq!(bristles.slipping(forward, [1.0, 2.0, 0.51, 1.0]), None, "{law:?}");
+            assert_eq!(slipping(&bristles, forward, [1.0, 2.0, 0.51, 1.0]), None, "{law:?}");
         }
     }
 

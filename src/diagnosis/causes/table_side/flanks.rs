@@ -12,15 +12,15 @@ const SWING_S: f64 = 4e-3;
 /// Where the tables are.
 #[derive(Clone, Copy)]
 struct State<const N: usize> {
-    position: [f64; N],
-    speed: [f64; N],
+    position: Lanes<N>,
+    speed: Lanes<N>,
     /// Rows in which the flanks pushed since the encoder would have told them apart, and the way they push.
-    together: [usize; N],
-    side: [f64; N],
+    together: Lanes<N>,
+    side: Lanes<N>,
     /// How the motor has given way.
-    given: [[f64; N]; 3],
+    given: [Lanes<N>; 3],
     /// Not known to move with the motor.
-    loose: [bool; N],
+    loose: Which<N>,
 }
 
 impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
@@ -33,18 +33,20 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         lag: &mut [[f64; N]],
     ) {
         let unit = self.frame.unit;
+        let (nothing, per_unit) = (Lanes::splat(0.0), Lanes::splat(unit));
         let giving = Giving::new(self.frame.columns.period_s, self.step_s);
-        let settled = (SWING_S / self.frame.columns.period_s).ceil() as usize;
+        let settled = Lanes::splat((SWING_S / self.frame.columns.period_s).ceil());
         // Where the table of a rigid link is at a load.
-        let behind = |l: usize, motor: f64, load: f64| motor - self.half[l].copysign(load) - load / self.stiffness[l];
+        let behind = |motor: Lanes<N>, load: Lanes<N>| motor - self.half.copysign(load) - load / self.stiffness;
+        let firmly = self.share * 0.1;
         let mut load = self.carried(rows.start);
         let mut state = State {
-            position: [0.0; N],
-            speed: [0.0; N],
-            together: [0; N],
-            side: [0.0; N],
-            given: [[0.0; N]; 3],
-            loose: [false; N],
+            position: nothing,
+            speed: nothing,
+            together: nothing,
+            side: nothing,
+            given: [nothing; 3],
+            loose: Which::splat(false),
         };
         // How friction has built up on the way of each table, and as the motor's way has it where a table moves with that.
         let mut bristles = if BUILDS_UP { self.bristles } else { None };
@@ -57,56 +59,48 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         for i in rows.start..rows.end - 1 {
             extra[i + 1] = [0.0; N];
             let next = self.carried(i + 1);
-            let motor = self.frame.columns.position[i] * unit;
+            let motor = Lanes::splat(self.frame.columns.position[i] * unit);
             let steady = i > rows.start && self.frame.direction[i] * self.frame.direction[i + 1] > 0.5;
             let level = self.resistance.each(|r| r.level[i]);
             if let Some(bristles) = with_motor.as_mut().filter(|_| i > rows.start) {
                 let way = (self.frame.columns.position[i] - self.frame.columns.position[i - 1]) * unit;
                 bristles.moved_together(way, level, R::DISTINCT);
             }
-            let mut firm = [false; N];
-            let mut all_firm = steady;
-            for l in 0..N {
-                let both = smaller(load[l].abs(), next[l].abs());
-                // Near no load the flanks may part within the row.
-                firm[l] =
-                    steady & !self.swings[l] & (both > 0.1 * self.share[l] * level[l]) & (load[l] * next[l] > 0.0);
-                all_firm &= firm[l];
-            }
+            // Near no load the flanks may part within the row.
+            let both = load.abs().smaller(next.abs());
+            let loaded = both.above(firmly * level) & (load * next).above(nothing);
+            let firm = Which::splat(steady) & !self.swings & loaded;
             // In most rows of most tables this is all.
-            if all_firm && !any {
+            if firm.all() && !any {
                 if let Some(lag) = lag.get_mut(i) {
-                    *lag = lanes(|l| (behind(l, motor, load[l]) - motor) / unit);
+                    *lag = ((behind(motor, load) - motor) / per_unit).to_array();
                 }
                 load = next;
                 continue;
             }
-            any = false;
-            for l in 0..N {
-                let firm = firm[l];
-                let held = !state.loose[l] || state.together[l] >= settled && state.side[l] * load[l] > 0.0;
-                if firm && held || !state.loose[l] {
-                    state.position[l] = behind(l, motor, load[l]);
-                    state.speed[l] = self.frame.raw_speed[i] * unit;
-                    state.together[l] = 0;
-                    (state.given[0][l], state.given[1][l], state.given[2][l]) = (0.0, 0.0, load[l]);
-                    if let (Some(bristles), Some(with_motor)) = (&mut bristles, &with_motor) {
-                        bristles.take(l, with_motor);
-                    }
+            let touching = state.together.reach(settled) & (state.side * load).above(nothing);
+            let with_it = firm & (!state.loose | touching);
+            let begins = with_it | !state.loose;
+            if begins.any() {
+                state.position = begins.choose(behind(motor, load), state.position);
+                state.speed = begins.choose(Lanes::splat(self.frame.raw_speed[i] * unit), state.speed);
+                state.together = (!begins).keep(state.together);
+                let [give, giving, answered] = state.given;
+                state.given = [(!begins).keep(give), (!begins).keep(giving), begins.choose(load, answered)];
+                if let (Some(bristles), Some(with_motor)) = (&mut bristles, &with_motor) {
+                    bristles.take(begins, with_motor);
                 }
-                state.loose[l] = !(firm && held);
-                any |= state.loose[l];
             }
+            state.loose = !with_it;
+            any = state.loose.any();
             if let Some(lag) = lag.get_mut(i) {
-                *lag = lanes(|l| (state.position[l] - motor) / unit);
+                *lag = ((state.position - motor) / per_unit).to_array();
             }
             if any {
-                let [near, far] = self.between(i, giving, &mut state, bristles.as_mut());
-                let rigid = self.rigid(i);
-                for l in (0..N).filter(|l| state.loose[*l]) {
-                    extra[i][l] += near[l] - rigid[0][l];
-                    extra[i + 1][l] += far[l] - rigid[1][l];
-                }
+                let ([near, far], rigid) = (self.between(i, giving, &mut state, bristles.as_mut()), self.rigid(i));
+                let so_far = Lanes::each(|l| extra[i][l]);
+                extra[i] = (so_far + state.loose.keep(near - rigid[0])).to_array();
+                extra[i + 1] = state.loose.keep(far - rigid[1]).to_array();
             }
             load = next;
         }
@@ -121,30 +115,28 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         yielding: Giving,
         state: &mut State<N>,
         bristles: Option<&mut Bristles<N>>,
-    ) -> [[f64; N]; 2] {
+    ) -> [Lanes<N>; 2] {
         let resisting = self.resisting_tables(row);
         let at = (row, yielding, &resisting);
         let Some(bristles) = bristles else {
             // Dry friction takes what speed it can, and never turns it.
-            let dry: [f64; N] = lanes(|l| self.mobility[l] * resisting.friction[l]);
+            let dry = self.mobility * resisting.friction;
             return self.stepping(
                 at,
                 state,
                 #[inline(always)]
-                |free, _| lanes(|l| larger(smaller(free[l], dry[l]), -dry[l])),
+                |free, _| free.smaller(dry).larger(-dry),
             );
         };
         if let Some(shares) = self.slipping(at, state, bristles) {
             return shares;
         }
+        let rubs = self.mobility * self.share;
         self.stepping(
             at,
             state,
             #[inline(always)]
-            |_, v| {
-                let torque = bristles.moved(lanes(|l| self.step_s * v[l]), resisting.level);
-                lanes(|l| self.mobility[l] * self.share[l] * torque[l])
-            },
+            |_, v| rubs * bristles.moved(v * self.step_s, resisting.level),
         )
     }
 
@@ -156,21 +148,21 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         at: (usize, Giving, &Resisting<N>),
         state: &mut State<N>,
         bristles: &Bristles<N>,
-    ) -> Option<[[f64; N]; 2]> {
+    ) -> Option<[Lanes<N>; 2]> {
         let torque = bristles.slipping(state.speed, at.2.level)?;
-        let (before, rubbed) = (*state, lanes(|l| self.mobility[l] * self.share[l] * torque[l]));
-        let goes_on = |v: &[f64; N]| (0..N).fold(true, |all, l| all & (v[l] * torque[l] >= 0.0));
-        let mut all_go_on = true;
+        let (before, rubbed) = (*state, self.mobility * self.share * torque);
+        let goes_on = |v: Lanes<N>| (v * torque).reach(Lanes::splat(0.0));
+        let mut all_go_on = Which::splat(true);
         let shares = self.stepping(
             at,
             state,
             #[inline(always)]
             |_, v| {
-                all_go_on &= goes_on(&v);
+                all_go_on = all_go_on & goes_on(v);
                 rubbed
             },
         );
-        if all_go_on && goes_on(&state.speed) {
+        if (all_go_on & goes_on(state.speed)).all() {
             return Some(shares);
         }
         *state = before;
@@ -183,59 +175,43 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         &self,
         (row, yielding, resisting): (usize, Giving, &Resisting<N>),
         state: &mut State<N>,
-        mut rub: impl FnMut([f64; N], [f64; N]) -> [f64; N],
-    ) -> [[f64; N]; 2] {
+        mut rub: impl FnMut(Lanes<N>, Lanes<N>) -> Lanes<N>,
+    ) -> [Lanes<N>; 2] {
         let way = self.way(row);
         let (per_step, per_span) = (1.0 / self.steps as f64, 1.0 / self.frame.columns.period_s);
         let half_step = 0.5 * self.step_s;
-        // What swings slower than the rows come is in the motor's measured way.
-        let motor_mobility = lanes::<N>(|l| if self.swings[l] { 0.0 } else { self.step_s / self.motor_inertia[l] });
         // Each step waits for the one before it: what does not depend on that is worked out beside it, not within.
-        let pull: [f64; N] = lanes(|l| self.mobility[l] * resisting.load[l]);
-        let slack = lanes::<N>(|l| self.stiffness[l] * self.half[l]);
+        let pull = self.mobility * resisting.load;
+        let nothing = Lanes::splat(0.0);
         let mut v = state.speed;
-        let mut middle: [f64; N] = lanes(|l| state.position[l] + half_step * v[l]);
+        let mut middle = state.position + v * half_step;
         let [mut give, mut giving, mut answered] = state.given;
-        let (mut sum, mut far, mut nearest) = ([0.0; N], [0.0; N], [f64::INFINITY; N]);
+        let (mut sum, mut far, mut nearest) = (nothing, nothing, Lanes::splat(f64::INFINITY));
         for step in 0..self.steps {
             let s = (step as f64 + 0.5) * per_step;
-            let (motor, speed) = (way.position(s), way.speed(s) * per_span);
-            // One number of all tables after the other, so that registers hold four at a time.
-            let wind: [f64; N] = lanes(|l| (motor + give[l]) - middle[l]);
-            let side: [f64; N] = lanes(|l| 1.0f64.copysign(wind[l]));
-            let far_apart: [f64; N] = lanes(|l| wind[l].abs());
-            let outward: [f64; N] = lanes(|l| self.damping[l] * ((speed + giving[l]) - v[l]));
+            let (motor, speed) = (Lanes::splat(way.position(s)), Lanes::splat(way.speed(s) * per_span));
+            let wind = (motor + give) - middle;
+            let (side, far_apart) = (wind.sign(), wind.abs());
+            let outward = self.damping * ((speed + giving) - v);
             // Flanks push and never pull.
-            let spring: [f64; N] =
-                lanes(|l| larger(self.stiffness[l] * far_apart[l] + (outward[l] * side[l] - slack[l]), 0.0));
-            let push: [f64; N] = lanes(|l| if far_apart[l] > self.half[l] { spring[l] } else { 0.0 });
-            let push: [f64; N] = lanes(|l| push[l] * side[l]);
-            nearest = lanes(|l| smaller(far_apart[l], nearest[l]));
-            let given: [[f64; 3]; N] =
-                std::array::from_fn(|l| yielding.step([give[l], giving[l], answered[l]], push[l], motor_mobility[l]));
-            give = lanes(|l| given[l][0]);
-            giving = lanes(|l| given[l][1]);
-            answered = lanes(|l| given[l][2]);
-            sum = lanes(|l| sum[l] + push[l]);
-            far = lanes(|l| far[l] + s * push[l]);
-            let free: [f64; N] = lanes(|l| (self.kept[l] * v[l] - pull[l]) + self.mobility[l] * push[l]);
-            let rubbed = rub(free, v);
-            for l in 0..N {
-                v[l] = free[l] - rubbed[l];
-                middle[l] += self.step_s * v[l];
-            }
+            let spring = (self.stiffness * far_apart + (outward * side - self.slack)).larger(nothing);
+            let push = far_apart.above(self.half).keep(spring) * side;
+            nearest = far_apart.smaller(nearest);
+            [give, giving, answered] = yielding.step([give, giving, answered], push, self.motor_mobility);
+            sum = sum + push;
+            far = far + push * s;
+            let free = (self.kept * v - pull) + self.mobility * push;
+            v = free - rub(free, v);
+            middle = middle + v * self.step_s;
         }
         // The last step ends in the middle of one that is not made.
-        let x = lanes(|l| middle[l] - half_step * v[l]);
-        (state.position, state.speed, state.side) = (x, v, sum);
+        (state.position, state.speed, state.side) = (middle - v * half_step, v, sum);
         state.given = [give, giving, answered];
         // A measured motor trembles by its encoder, and would part flanks that rest on each other for ever.
-        let told_apart = self.frame.resolution * self.frame.unit;
-        for l in 0..N {
-            let touched = usize::from(sum[l] != 0.0);
-            state.together[l] = if nearest[l] > self.half[l] - told_apart { state.together[l] + touched } else { 0 };
-        }
-        [lanes(|l| (sum[l] - far[l]) * per_step), far.map(|far| far * per_step)]
+        let told_apart = Lanes::splat(self.frame.resolution * self.frame.unit);
+        let touched = (sum.above(nothing) | nothing.above(sum)).keep(Lanes::splat(1.0));
+        state.together = nearest.above(self.half - told_apart).keep(state.together + touched);
+        [(sum - far) * per_step, far * per_step]
     }
 }
 

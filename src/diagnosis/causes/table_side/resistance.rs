@@ -2,7 +2,7 @@
 //! crossed, by all the friction that there is, not by that of the belief alone: behind a drive whose friction rises by a third the
 //! table lags by a third more.
 
-use super::{Law, Trace, lanes};
+use super::{Lanes, Law, Trace};
 use crate::diagnosis::belief;
 use crate::diagnosis::frame::Frame;
 use crate::diagnosis::many::{add, apart, decay, dot, to_the_power, widest};
@@ -216,7 +216,7 @@ pub(super) trait Resisted<const N: usize>: Copy {
     const DISTINCT: usize;
 
     /// A number of each.
-    fn each(self, of: impl Fn(&Resistance) -> f64) -> [f64; N];
+    fn each(self, of: impl Fn(&Resistance) -> f64) -> Lanes<N>;
 
     /// That of one.
     fn lane(&self, at: usize) -> &Resistance;
@@ -233,8 +233,8 @@ impl<const N: usize> Resisted<N> for Alike<'_> {
     const DISTINCT: usize = 1;
 
     #[inline(always)]
-    fn each(self, of: impl Fn(&Resistance) -> f64) -> [f64; N] {
-        [of(self.0); N]
+    fn each(self, of: impl Fn(&Resistance) -> f64) -> Lanes<N> {
+        Lanes::splat(of(self.0))
     }
 
     fn lane(&self, _: usize) -> &Resistance {
@@ -254,8 +254,8 @@ impl<const N: usize> Resisted<N> for Each<'_, N> {
     const DISTINCT: usize = N;
 
     #[inline(always)]
-    fn each(self, of: impl Fn(&Resistance) -> f64) -> [f64; N] {
-        lanes(|l| of(self.0[l]))
+    fn each(self, of: impl Fn(&Resistance) -> f64) -> Lanes<N> {
+        Lanes::each(|l| of(self.0[l]))
     }
 
     fn lane(&self, at: usize) -> &Resistance {

@@ -13,34 +13,32 @@ const DIP: f64 = 0.25;
 
 /// Where tables are, seen from where the motor was at the beginning of a piece of its way, and what their springs made.
 struct Moved<const N: usize> {
-    position: [f64; N],
-    speed: [f64; N],
+    position: Lanes<N>,
+    speed: Lanes<N>,
     /// Speed half way.
-    half_way: [f64; N],
+    half_way: Lanes<N>,
     /// Σ torque over the steps, and Σ torque·share of the time since the beginning of the piece.
-    sum: [f64; N],
-    far: [f64; N],
+    sum: Lanes<N>,
+    far: Lanes<N>,
 }
 
 /// What one number of [`Moved`] is by one unit of all that makes it.
 struct Made<const N: usize> {
-    position: [f64; N],
-    speed: [f64; N],
-    rate: [f64; N],
-    bend: [f64; N],
-    twist: [f64; N],
+    position: Lanes<N>,
+    speed: Lanes<N>,
+    rate: Lanes<N>,
+    bend: Lanes<N>,
+    twist: Lanes<N>,
     /// Torque against moving forward.
-    resisting: [f64; N],
+    resisting: Lanes<N>,
 }
 
 impl<const N: usize> Made<N> {
     #[inline(always)]
-    fn of(&self, way: &Way, x: &[f64; N], v: &[f64; N], resisting: &[f64; N]) -> [f64; N] {
-        lanes(|l| {
-            let motor = self.rate[l] * way.rate + self.bend[l] * way.bend + self.twist[l] * way.twist;
-            let table = self.position[l] * x[l] + self.speed[l] * v[l];
-            motor + (table + self.resisting[l] * resisting[l])
-        })
+    fn of(&self, way: &Way, x: Lanes<N>, v: Lanes<N>, resisting: Lanes<N>) -> Lanes<N> {
+        let motor = self.rate * way.rate + self.bend * way.bend + self.twist * way.twist;
+        let table = self.position * x + self.speed * v;
+        motor + (table + self.resisting * resisting)
     }
 }
 
@@ -61,14 +59,14 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
     pub(super) fn sliding(&self) -> Sliding<N> {
         let steps = self.steps / self.pieces;
         const REST: Way = Way { at: 0.0, rate: 0.0, bend: 0.0, twist: 0.0 };
-        let (none, one) = ([0.0; N], [1.0; N]);
-        let by = |way, position, speed, load| self.stepped(&way, position, speed, steps, load, |_, _| 0.0);
+        let (none, one) = (Lanes::splat(0.0), Lanes::splat(1.0));
+        let by = |way, position, speed, load| self.stepped(&way, position, speed, steps, load, |_| none);
         let (position, speed) = (by(REST, one, none, none), by(REST, none, one, none));
         let rate = by(Way { rate: 1.0, ..REST }, none, none, none);
         let bend = by(Way { bend: 1.0, ..REST }, none, none, none);
         let twist = by(Way { twist: 1.0, ..REST }, none, none, none);
         let resisting = by(REST, none, none, one);
-        let made = |of: fn(&Moved<N>) -> [f64; N]| Made {
+        let made = |of: fn(&Moved<N>) -> Lanes<N>| Made {
             position: of(&position),
             speed: of(&speed),
             rate: of(&rate),
@@ -102,9 +100,9 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
                 extra,
                 lag,
                 #[inline(always)]
-                |way, x, v, at| match sliding.moved(way, x, v, &at.load, &at.friction) {
+                |way, x, v, at| match sliding.moved(way, x, v, at) {
                     Some(slid) => slid,
-                    None => self.rubbed(&Way { at: 0.0, ..*way }, *x, *v, sliding.steps, at),
+                    None => self.rubbed(&Way { at: 0.0, ..*way }, x, v, sliding.steps, at),
                 },
             ),
             Some(mut bristles) => {
@@ -116,10 +114,9 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
                     lag,
                     #[inline(always)]
                     |way, x, v, at| {
-                        let half_way = bristles.after(lanes(|l| half * v[l]), at.level);
-                        let rub = lanes(|l| at.load[l] + self.share[l] * half_way[l]);
-                        let moved = sliding.moved_against(way, x, v, &rub);
-                        bristles.moved(lanes(|l| moved.position[l] - x[l]), at.level);
+                        let half_way = bristles.after(v * half, at.level);
+                        let moved = sliding.moved_against(way, x, v, at.load + self.share * half_way);
+                        bristles.moved(moved.position - x, at.level);
                         moved
                     },
                 );
@@ -135,16 +132,13 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         rows: Range<usize>,
         extra: &mut [[f64; N]],
         lag: &mut [[f64; N]],
-        mut go: impl FnMut(&Way, &[f64; N], &[f64; N], &Resisting<N>) -> Moved<N>,
+        mut go: impl FnMut(&Way, Lanes<N>, Lanes<N>, &Resisting<N>) -> Moved<N>,
     ) {
         let unit = self.frame.unit;
         let per_step = 1.0 / self.steps as f64;
         // Seen from the motor.
-        let mut x = self.carried_first(rows.clone());
-        for l in 0..N {
-            x[l] = -x[l] / self.stiffness[l];
-        }
-        let mut v = [self.frame.raw_speed[rows.start] * unit; N];
+        let mut x = -self.carried_first(rows.clone()) / self.stiffness;
+        let mut v = Lanes::splat(self.frame.raw_speed[rows.start] * unit);
         extra[rows.start] = [0.0; N];
         if let Some(last) = lag.get_mut(rows.end - 1) {
             *last = [0.0; N];
@@ -152,66 +146,68 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         for i in rows.start..rows.end - 1 {
             if let Some(lag) = lag.get_mut(i) {
                 // The real spring winds up less.
-                *lag = lanes(|l| self.softer[l] * x[l] / unit);
+                *lag = (self.softer * x / Lanes::splat(unit)).to_array();
             }
             let mut way = self.way(i);
             let resisting = self.resisting_tables(i);
-            let (mut sum, mut far) = ([0.0; N], [0.0; N]);
+            let (mut sum, mut far) = (Lanes::splat(0.0), Lanes::splat(0.0));
             for piece in 0..self.pieces {
-                let moved = go(&way, &x, &v, &resisting);
+                let moved = go(&way, x, v, &resisting);
                 let next = way.from(sliding.share);
                 let before = piece as f64 * sliding.share;
-                for l in 0..N {
-                    x[l] = moved.position[l] - (next.at - way.at);
-                    sum[l] += moved.sum[l];
-                    far[l] += moved.far[l] + before * moved.sum[l];
-                }
+                x = moved.position - Lanes::splat(next.at - way.at);
+                sum = sum + moved.sum;
+                far = far + (moved.far + moved.sum * before);
                 v = moved.speed;
                 way = next;
             }
             let rigid = self.rigid(i);
-            for l in 0..N {
-                extra[i][l] += (sum[l] - far[l]) * per_step - rigid[0][l];
-                extra[i + 1][l] = far[l] * per_step - rigid[1][l];
-            }
+            let so_far = Lanes::each(|l| extra[i][l]);
+            extra[i] = (so_far + ((sum - far) * per_step - rigid[0])).to_array();
+            extra[i + 1] = (far * per_step - rigid[1]).to_array();
         }
     }
 
     /// Makes so many steps against dry friction, which may hold a table or turn it.
     #[inline(always)]
-    fn rubbed(&self, way: &Way, x: [f64; N], v: [f64; N], steps: usize, at: &Resisting<N>) -> Moved<N> {
-        let most: [f64; N] = lanes(|l| self.mobility[l] * at.friction[l]);
-        let rub = |l: usize, free: f64| larger(smaller(free, most[l]), -most[l]);
-        self.stepped(way, x, v, steps, at.load, rub)
+    fn rubbed(&self, way: &Way, x: Lanes<N>, v: Lanes<N>, steps: usize, at: &Resisting<N>) -> Moved<N> {
+        let most = self.mobility * at.friction;
+        // Dry friction takes what speed it can, and never turns it.
+        self.stepped(
+            way,
+            x,
+            v,
+            steps,
+            at.load,
+            #[inline(always)]
+            |free| free.smaller(most).larger(-most),
+        )
     }
 
-    /// Makes so many steps; `rub` says what dry friction takes off a speed.
+    /// Makes so many steps; `rub` says what dry friction takes off speeds.
     #[inline(always)]
     fn stepped(
         &self,
         way: &Way,
-        mut x: [f64; N],
-        mut v: [f64; N],
+        mut x: Lanes<N>,
+        mut v: Lanes<N>,
         steps: usize,
-        load: [f64; N],
-        rub: impl Fn(usize, f64) -> f64,
+        load: Lanes<N>,
+        rub: impl Fn(Lanes<N>) -> Lanes<N>,
     ) -> Moved<N> {
         let (per_step, per_span) = (1.0 / self.steps as f64, 1.0 / self.frame.columns.period_s);
         let half_step = 0.5 * self.step_s;
-        let (mut sum, mut far, mut half_way) = ([0.0; N], [0.0; N], v);
+        let (mut sum, mut far, mut half_way) = (Lanes::splat(0.0), Lanes::splat(0.0), v);
         for step in 0..steps {
             let s = (step as f64 + 0.5) * per_step;
-            let (motor, speed) = (way.position(s), way.speed(s) * per_span);
-            for l in 0..N {
-                let middle = x[l] + half_step * v[l];
-                let push = self.stiffness[l] * (motor - middle) + self.damping[l] * (speed - v[l]);
-                sum[l] += push;
-                far[l] += s * push;
-                // Dry friction takes what speed it can, and never turns it.
-                let free = self.kept[l] * v[l] + self.mobility[l] * (push - load[l]);
-                v[l] = free - rub(l, free);
-                x[l] = middle + half_step * v[l];
-            }
+            let (motor, speed) = (Lanes::splat(way.position(s)), Lanes::splat(way.speed(s) * per_span));
+            let middle = x + v * half_step;
+            let push = self.stiffness * (motor - middle) + self.damping * (speed - v);
+            sum = sum + push;
+            far = far + push * s;
+            let free = self.kept * v + self.mobility * (push - load);
+            v = free - rub(free);
+            x = middle + v * half_step;
             if step + 1 == steps / 2 {
                 half_way = v;
             }
@@ -221,30 +217,29 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
 }
 
 impl<const N: usize> Sliding<N> {
-    /// Tables at a place and speed moved on by a piece of the motor's way, under a load and so much dry friction; `None` where one may
-    /// not slide one way all along.
+    /// Tables at a place and speed moved on by a piece of the motor's way, under what resists them; `None` where one may not slide one
+    /// way all along.
     #[inline(always)]
-    fn moved(&self, way: &Way, x: &[f64; N], v: &[f64; N], load: &[f64; N], friction: &[f64; N]) -> Option<Moved<N>> {
-        let side: [f64; N] = lanes(|l| 1.0f64.copysign(v[l]));
-        let resisting = lanes(|l| load[l] + friction[l] * side[l]);
-        let (half_way, speed) = (self.half_way.of(way, x, v, &resisting), self.speed.of(way, x, v, &resisting));
-        // By how much it slides on at least.
-        let mut least = f64::INFINITY;
-        for l in 0..N {
-            let (begin, half_way, end) = (v[l] * side[l], half_way[l] * side[l], speed[l] * side[l]);
-            let dip = DIP * (begin - 2.0 * half_way + end).abs();
-            least = smaller(least, smaller(begin, smaller(half_way, end)) - dip);
-        }
-        if !(least > 0.0) {
-            return None;
-        }
-        let (position, sum) = (self.position.of(way, x, v, &resisting), self.sum.of(way, x, v, &resisting));
-        Some(Moved { position, speed, half_way, sum, far: self.far.of(way, x, v, &resisting) })
+    fn moved(&self, way: &Way, x: Lanes<N>, v: Lanes<N>, at: &Resisting<N>) -> Option<Moved<N>> {
+        let side = v.sign();
+        let resisting = at.load + at.friction * side;
+        let (half_way, speed) = (self.half_way.of(way, x, v, resisting), self.speed.of(way, x, v, resisting));
+        // By how much they slide on at least.
+        let (begin, middle, end) = (v * side, half_way * side, speed * side);
+        let dip = (begin - middle * 2.0 + end).abs() * DIP;
+        let least = begin.smaller(middle.smaller(end)) - dip;
+        least.above(Lanes::splat(0.0)).all().then(|| Moved {
+            position: self.position.of(way, x, v, resisting),
+            speed,
+            half_way,
+            sum: self.sum.of(way, x, v, resisting),
+            far: self.far.of(way, x, v, resisting),
+        })
     }
 
     /// The same against a torque that is known.
     #[inline(always)]
-    fn moved_against(&self, way: &Way, x: &[f64; N], v: &[f64; N], resisting: &[f64; N]) -> Moved<N> {
+    fn moved_against(&self, way: &Way, x: Lanes<N>, v: Lanes<N>, resisting: Lanes<N>) -> Moved<N> {
         let of = |made: &Made<N>| made.of(way, x, v, resisting);
         Moved {
             position: of(&self.position),
