@@ -60,31 +60,42 @@ impl<const N: usize> Bristles<N> {
         }
     }
 
-    /// All moved alike, of which so many differ; the rest go as the first.
-    #[inline(always)]
-    pub(super) fn moved_together(&mut self, way: f64, level: Lanes<N>, distinct: usize) {
+    /// Whether the torque of each is all that there is to know of how it has built up.
+    pub(super) fn are_told_by_force(&self) -> bool {
         match self {
-            Self::Plain { .. } => _ = self.moved(Lanes::splat(way), level),
+            Self::Plain { .. } => true,
+            Self::Other(frictions) => frictions.iter().all(|friction| friction.elements.is_none()),
+        }
+    }
+
+    /// Makes those of some tables, of which the torque tells all, hold so much.
+    #[inline(always)]
+    pub(super) fn hold(&mut self, these: Which<N>, held: Lanes<N>) {
+        match self {
+            Self::Plain { force, .. } => *force = these.choose(held, *force),
             Self::Other(frictions) => {
-                for l in 0..distinct {
-                    frictions[l].moved(way, level.of(l));
-                }
-                for l in distinct..N {
-                    frictions[l] = frictions[0];
-                }
+                (0..N).filter(|l| these.of(*l)).for_each(|l| frictions[l].bristle.force = held.of(l));
             }
         }
     }
 
-    /// Makes those of some tables what they are in others.
+    /// Others than plain ones, all moved alike, of which so many differ; the rest go as the first.
+    #[inline(always)]
+    pub(super) fn moved_together(&mut self, way: f64, level: Lanes<N>, distinct: usize) {
+        let Self::Other(frictions) = self else { return };
+        for l in 0..distinct {
+            frictions[l].moved(way, level.of(l));
+        }
+        for l in distinct..N {
+            frictions[l] = frictions[0];
+        }
+    }
+
+    /// Makes those of some tables, which are no plain ones, what they are in others.
     #[inline(always)]
     pub(super) fn take(&mut self, these: Which<N>, from: &Self) {
-        match (self, from) {
-            (Self::Plain { force, .. }, Self::Plain { force: other, .. }) => *force = these.choose(*other, *force),
-            (Self::Other(frictions), Self::Other(others)) => {
-                (0..N).filter(|l| these.of(*l)).for_each(|l| frictions[l] = others[l]);
-            }
-            _ => {}
+        if let (Self::Other(frictions), Self::Other(others)) = (self, from) {
+            (0..N).filter(|l| these.of(*l)).for_each(|l| frictions[l] = others[l]);
         }
     }
 }

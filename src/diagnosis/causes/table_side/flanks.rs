@@ -50,7 +50,9 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         };
         // How friction has built up on the way of each table, and as the motor's way has it where a table moves with that.
         let mut bristles = if BUILDS_UP { self.bristles } else { None };
-        let mut with_motor = bristles;
+        let mut with_motor = bristles.filter(|bristles| !bristles.are_told_by_force());
+        let held: Option<[&[f64]; N]> =
+            bristles.map(|_| std::array::from_fn(|l| self.resistance.lane(l).held(self.frame)));
         let mut any = false;
         extra[rows.start] = [0.0; N];
         if let Some(last) = lag.get_mut(rows.end - 1) {
@@ -64,7 +66,7 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
             let level = self.resistance.each(|r| r.level[i]);
             if let Some(bristles) = with_motor.as_mut().filter(|_| i > rows.start) {
                 let way = (self.frame.columns.position[i] - self.frame.columns.position[i - 1]) * unit;
-                bristles.moved_together(way, level, R::DISTINCT);
+                bristles.moved_together(way, self.resistance.each(|r| r.level[i]), R::DISTINCT);
             }
             // Near no load the flanks may part within the row.
             let both = load.abs().smaller(next.abs());
@@ -87,8 +89,12 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
                 state.together = (!begins).keep(state.together);
                 let [give, giving, answered] = state.given;
                 state.given = [(!begins).keep(give), (!begins).keep(giving), begins.choose(load, answered)];
-                if let (Some(bristles), Some(with_motor)) = (&mut bristles, &with_motor) {
-                    bristles.take(begins, with_motor);
+                match (&mut bristles, &with_motor) {
+                    (Some(bristles), Some(with_motor)) => bristles.take(begins, with_motor),
+                    (Some(bristles), None) => {
+                        bristles.hold(begins, held.map_or(nothing, |held| Lanes::each(|l| held[l][i])));
+                    }
+                    _ => {}
                 }
             }
             state.loose = !with_it;

@@ -9,6 +9,7 @@ use crate::diagnosis::many::{add, apart, decay, dot, to_the_power, widest};
 use crate::machine::{Axis, Effect, TwoMasses};
 use crate::plant::friction::Friction;
 use crate::plant::physics::Physics;
+use std::sync::OnceLock;
 
 /// Change of dry friction and load, as a share of both (root mean square), that leaves a simulated table where it is.
 const ALIKE: f64 = 3e-4;
@@ -41,6 +42,8 @@ pub struct Resistance {
     pub(super) viscous: f64,
     /// What dry friction builds up by, at rest, of a table with all of it; `None` where it is there at once.
     pub(super) bristle: Option<(Friction, f64)>,
+    /// What a bristle of such a table holds at each row as long as the table moves with its motor, once somebody has asked for it.
+    held: OnceLock<Vec<f64>>,
 }
 
 /// What shakes a table, half way from each row to the next, drive's own unit: what a motor holds of it through a spring while the table
@@ -151,6 +154,7 @@ impl Resistance {
             load: none,
             viscous: 0.0,
             bristle: None,
+            held: OnceLock::new(),
         }
     }
 
@@ -170,11 +174,22 @@ impl Resistance {
                 None => at_once(frame, &of_motor).collect(),
             },
             level: if frame.table_v.is_empty() { of_motor } else { level(frame, physics, &frame.table_v) },
+            held: OnceLock::new(),
             even: v.iter().map(|v| 0.5 * (forward - backward) * (v * scale).abs()).collect(),
             load: rows.map(|i| physics.load(frame.x[i], v[i], frame.seconds(i))).collect(),
             viscous: 0.5 * (forward + backward),
             bristle,
         }
+    }
+
+    /// What a bristle of a table with all of the friction holds at each row as long as the table moves with its motor.
+    pub(super) fn held(&self, frame: &Frame) -> &[f64] {
+        self.held.get_or_init(|| {
+            let Some((at_rest, _)) = self.bristle else { return Vec::new() };
+            let mut held = built_up_along(frame, &frame.columns.position, at_rest, &self.level, |_, _| 0.0);
+            frame.columns.stretches.iter().for_each(|rows| held[rows.start] = 0.0);
+            held
+        })
     }
 
     /// Whether the load may lean a table on another flank than that of another does: flanks that friction parts at each turn a larger load
@@ -302,7 +317,17 @@ pub fn built_up(
     level: &[f64],
     more: impl Fn(&mut Friction, usize) -> f64,
 ) -> Vec<f64> {
-    let x = &frame.way;
+    built_up_along(frame, &frame.way, at_rest, level, more)
+}
+
+/// The same on another way, load units.
+fn built_up_along(
+    frame: &Frame,
+    x: &[f64],
+    at_rest: Friction,
+    level: &[f64],
+    more: impl Fn(&mut Friction, usize) -> f64,
+) -> Vec<f64> {
     let mut dry: Vec<f64> = at_once(frame, level).collect();
     if at_rest.is_plain_bristle() {
         // What a step leaves of the way to the level waits for no other step.
