@@ -178,10 +178,12 @@ fn imitated_torque(bench: &Bench, fit: &Fit) -> Option<usize> {
     })
 }
 
-/// A delay that is no longer than what the encoder makes of itself under the servo, which goes with the square of that error.
+/// A delay that is no longer than what the encoder makes of itself under the servo, which goes with the square of that error. The torque then
+/// seems early: late it is in spite of that.
 fn imitated_delay(bench: &Bench, fit: &Fit) -> Option<usize> {
     let part = fit.parts.iter().position(|part| part.law.cause == Cause::DeadTime)?;
-    (1e-3 * fit.parts[part].shape[0].abs() < SURELY * SURELY * delay_s(bench.frame)).then_some(part)
+    let (late_s, early_s) = (1e-3 * fit.parts[part].shape[0], delay_s(bench.frame));
+    (-SURELY * SURELY * early_s..early_s).contains(&late_s).then_some(part)
 }
 
 fn imitated_table(bench: &Bench, without: &[Fit], fit: &Fit) -> Option<usize> {
@@ -332,8 +334,10 @@ fn cleared(columns: &[Vec<f64>], basis: &[Vec<f64>]) -> Vec<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnosis::causes::law;
     use crate::diagnosis::causes::periods::{shows_along_stroke, waves};
     use crate::diagnosis::excerpt::Excerpt;
+    use crate::diagnosis::known::Known;
     use crate::machine::{Axis, Machine};
     use crate::plant::moves::Moves;
     use crate::plant::simulate::{Sensors, Setup, simulate};
@@ -365,6 +369,19 @@ mod tests {
             assert!((0.7..1.1).contains(&(delay_s(unknown) / delay_s(known))));
         });
         strokes(150.0, 0.0, |_, unknown| assert!(delay_s(unknown) < 1e-4, "{}", delay_s(unknown)));
+    }
+
+    /// The torque of a servo that answers noise seems early, never late.
+    #[test]
+    fn a_late_torque_is_no_answer_to_noise() {
+        strokes(150.0, 0.3, |known, _| {
+            let bench = Bench::new(known, &Known::of(known.axis, known));
+            let is_imitated = |times: f64| {
+                let delay = bench.parts(law(Cause::DeadTime), vec![vec![times * 1e3 * delay_s(known)]]);
+                imitated_delay(&bench, &bench.fit(delay)).is_some()
+            };
+            assert_eq!([-4.5, -3.5, 0.7, 1.5].map(is_imitated), [false, true, true, false]);
+        });
     }
 
     #[test]
