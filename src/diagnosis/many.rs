@@ -195,8 +195,7 @@ pub fn to_the_power(values: &mut [f64], exponent: f64) {
         #[inline(always)]
         || {
             for value in values.iter_mut() {
-                let y = exponent * binary_logarithm(*value);
-                let below = if y < 1000.0 { y } else { 1000.0 };
+                let below = (exponent * binary_logarithm(*value)).at_most(1000.0);
                 *value = two_to(if below > -1000.0 { below } else { -1000.0 });
             }
         },

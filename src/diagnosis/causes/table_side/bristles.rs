@@ -149,7 +149,7 @@ mod tests {
             let each: [Friction; 4] = lanes_of(|l| Friction::new(50.0 + 20.0 * l as f64, law));
             let mut bristles = Bristles::new(each);
             let (level, forward, one_turns) = ([1.0, 2.0, 0.5, 1.0], [1.0; 4], [1.0, 1.0, -1.0, 1.0]);
-            let of = |array: [f64; 4]| Lanes::each(|l| array[l]);
+            let of = Lanes::<4>::from;
             let slipping =
                 |bristles: &Bristles<4>, speed, level| bristles.slipping(of(speed), of(level)).map(Lanes::to_array);
             assert_eq!(slipping(&bristles, forward, level), None, "{law:?}");

@@ -33,7 +33,7 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         lag: &mut [[f64; N]],
     ) {
         let unit = self.frame.unit;
-        let (nothing, per_unit) = (Lanes::splat(0.0), Lanes::splat(unit));
+        let nothing = Lanes::splat(0.0);
         let giving = Giving::new(self.frame.columns.period_s, self.step_s);
         let settled = Lanes::splat((SWING_S / self.frame.columns.period_s).ceil());
         // Where the table of a rigid link is at a load.
@@ -51,8 +51,9 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         // How friction has built up on the way of each table, and as the motor's way has it where a table moves with that.
         let mut bristles = if BUILDS_UP { self.bristles } else { None };
         let mut with_motor = bristles.filter(|bristles| !bristles.are_told_by_force());
-        let held: Option<[&[f64]; N]> =
-            bristles.map(|_| std::array::from_fn(|l| self.resistance.lane(l).held(self.frame)));
+        let held: Option<[&[f64]; N]> = bristles
+            .filter(Bristles::are_told_by_force)
+            .map(|_| std::array::from_fn(|l| self.resistance.lane(l).held(self.frame)));
         let mut any = false;
         extra[rows.start] = [0.0; N];
         if let Some(last) = lag.get_mut(rows.end - 1) {
@@ -75,7 +76,7 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
             // In most rows of most tables this is all.
             if firm.all() && !any {
                 if let Some(lag) = lag.get_mut(i) {
-                    *lag = ((behind(motor, load) - motor) / per_unit).to_array();
+                    *lag = ((behind(motor, load) - motor) / unit).to_array();
                 }
                 load = next;
                 continue;
@@ -89,23 +90,22 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
                 state.together = (!begins).keep(state.together);
                 let [give, giving, answered] = state.given;
                 state.given = [(!begins).keep(give), (!begins).keep(giving), begins.choose(load, answered)];
-                match (&mut bristles, &with_motor) {
-                    (Some(bristles), Some(with_motor)) => bristles.take(begins, with_motor),
-                    (Some(bristles), None) => {
-                        bristles.hold(begins, held.map_or(nothing, |held| Lanes::each(|l| held[l][i])));
+                if let Some(bristles) = &mut bristles {
+                    match (&with_motor, held) {
+                        (Some(with_motor), _) => bristles.take(begins, with_motor),
+                        (None, Some(held)) => bristles.hold(begins, Lanes::each(|l| held[l][i])),
+                        (None, None) => {}
                     }
-                    _ => {}
                 }
             }
             state.loose = !with_it;
             any = state.loose.any();
             if let Some(lag) = lag.get_mut(i) {
-                *lag = ((state.position - motor) / per_unit).to_array();
+                *lag = ((state.position - motor) / unit).to_array();
             }
             if any {
                 let ([near, far], rigid) = (self.between(i, giving, &mut state, bristles.as_mut()), self.rigid(i));
-                let so_far = Lanes::each(|l| extra[i][l]);
-                extra[i] = (so_far + state.loose.keep(near - rigid[0])).to_array();
+                extra[i] = (Lanes::from(extra[i]) + state.loose.keep(near - rigid[0])).to_array();
                 extra[i + 1] = state.loose.keep(far - rigid[1]).to_array();
             }
             load = next;

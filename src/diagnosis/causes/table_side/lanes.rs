@@ -183,6 +183,22 @@ impl<const N: usize> Mul<f64> for Lanes<N> {
     }
 }
 
+impl<const N: usize> Div<f64> for Lanes<N> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn div(self, by: f64) -> Self {
+        self / Self::splat(by)
+    }
+}
+
+impl<const N: usize> From<[f64; N]> for Lanes<N> {
+    #[inline(always)]
+    fn from(array: [f64; N]) -> Self {
+        Self::each(|l| array[l])
+    }
+}
+
 impl<const N: usize> Neg for Lanes<N> {
     type Output = Self;
 
@@ -248,6 +264,8 @@ mod tests {
             is(a * b, |x, y| x * y);
             is(a / b, |x, y| x / y);
             is(a * 3.0, |x, _| x * 3.0);
+            is(a / 3.0, |x, _| x / 3.0);
+            is(Lanes::from(a.to_array()), |x, _| x);
             is(-a, |x, _| -x);
             is(a.abs(), |x, _| x.abs());
             is(a.copysign(b), f64::copysign);

@@ -146,7 +146,7 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
         for i in rows.start..rows.end - 1 {
             if let Some(lag) = lag.get_mut(i) {
                 // The real spring winds up less.
-                *lag = (self.softer * x / Lanes::splat(unit)).to_array();
+                *lag = (self.softer * x / unit).to_array();
             }
             let mut way = self.way(i);
             let resisting = self.resisting_tables(i);
@@ -162,8 +162,7 @@ impl<const N: usize, R: Resisted<N>> Tables<'_, N, R> {
                 way = next;
             }
             let rigid = self.rigid(i);
-            let so_far = Lanes::each(|l| extra[i][l]);
-            extra[i] = (so_far + ((sum - far) * per_step - rigid[0])).to_array();
+            extra[i] = (Lanes::from(extra[i]) + ((sum - far) * per_step - rigid[0])).to_array();
             extra[i + 1] = (far * per_step - rigid[1]).to_array();
         }
     }
