@@ -11,6 +11,7 @@
 mod changed;
 mod equations;
 mod itself;
+mod promising;
 mod replays;
 mod sharper;
 mod trial;
@@ -39,6 +40,7 @@ use crate::analysis::statistics;
 use crate::machine::{Axis, Cause, Effect};
 use crate::plant::observed::Observed;
 use itself::by_torque;
+use promising::promising;
 use trial::{Refined, Trial, starts};
 
 /// [`LEAST_EXPLAINED`] where the torque is left with much that no cause explains; a clearance or a spring that explains less may lie in
@@ -51,12 +53,8 @@ const ALIKE: f64 = 0.8;
 /// What a cause in the place of one that the torque names may leave missed of what it leaves beside that: fewer causes that do about as
 /// well are the simpler answer.
 const ALIKE_LEFT: f64 = 1.1;
-/// Share of the best start's gain from which on another cause is refined beside it.
-const RIVAL: f64 = 0.25;
 /// Share of what is enough that some steps of refining must have taken off for more to be made.
 const HOPE: f64 = 0.25;
-/// Causes that are refined.
-const TRIED: usize = 4;
 
 const STAGE: &str = "asking the closed loop";
 
@@ -212,8 +210,21 @@ fn told(
         let gained = replays.gained(misses, &refined.error);
         Some((mean(&gained, JUDGES), gained, refined))
     };
-    let refined = watch.each(&best, (0.99, 0.995), STAGE, |trial| refine(trial.clone()))?;
-    let mut refined: Vec<(f64, Vec<f64>, Refined)> = refined.into_iter().flatten().collect();
+    let refine_all = |some: &[Trial]| -> Result<Vec<(f64, Vec<f64>, Refined)>, Stopped> {
+        let refined = watch.each(some, (0.99, 0.995), STAGE, |trial| refine(trial.clone()))?;
+        Ok(refined.into_iter().flatten().collect())
+    };
+    // What acts in proportion is a rival alone: it need not be refined beside nothing that may be told.
+    let (rivals, candidates): (Vec<Trial>, Vec<Trial>) = best.into_iter().partition(Trial::promises);
+    let mut refined = refine_all(&candidates)?;
+    let may_be_told = |(gain, gained, there): &(f64, Vec<f64>, Refined)| {
+        let may_gain = *gain >= enough(JUDGES) || there.trial.law.is_simulated();
+        may_gain && strength(gained, misses, JUDGES) > SURELY
+    };
+    if !refined.iter().any(may_be_told) {
+        return Ok(None);
+    }
+    refined.extend(refine_all(&rivals)?);
     refined.sort_by(|a, b| b.0.total_cmp(&a.0));
     // A clearance may be found where a spring was meant, whose starts end below what rows show.
     let spring = refined.first().and_then(|(gain, _, best)| Some((*gain, best.trial.as_spring(frame, extended)?)));
@@ -276,58 +287,6 @@ fn told(
         cause.name()
     );
     Ok(Some((mean(misses, JUDGES) - gain, Told { verdict, finding, note, by_half })))
-}
-
-/// Of these the causes that take most off what a machine misses in the beginning of the recording, each where it takes most.
-fn promising(
-    trials: Vec<Trial>,
-    replays: &Replays,
-    frame: &Frame,
-    extended: &Axis,
-    watch: &Watch,
-) -> Result<Vec<Trial>, Stopped> {
-    let Some(before) = replays.error(extended) else { return Ok(Vec::new()) };
-    let missed = |error: &[f64]| mean(&replays.misses(error), GIVES);
-    let sized = watch.each(&trials, (0.98, 0.985), STAGE, |trial| {
-        let (trial, error) = trial.clone().sized(frame, extended, replays, &before, GIVES)?;
-        Some((missed(&error), trial))
-    })?;
-    let mut sized: Vec<(f64, bool, Trial)> =
-        sized.into_iter().flatten().map(|(missed, trial)| (missed, !trial.promises(), trial)).collect();
-    // What acts in proportion has only promised so far, and is asked to show it where that would be among the best.
-    let mut near = loop {
-        sized.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut near: Vec<usize> = Vec::new();
-        for (at, (.., trial)) in sized.iter().enumerate() {
-            // A clearance whose numbers are not yet right shows nothing, and may be all the same.
-            let tried = near.len() < TRIED || trial.law.cause == Cause::Backlash;
-            if tried && near.iter().all(|other| !std::ptr::eq(sized[*other].2.law, trial.law)) {
-                near.push(at);
-            }
-        }
-        let promises: Vec<usize> = near.iter().copied().filter(|at| !sized[*at].1).collect();
-        if promises.is_empty() {
-            break near.into_iter().map(|at| (sized[at].0, sized[at].2.clone())).collect::<Vec<(f64, Trial)>>();
-        }
-        let shown = watch.each(&promises, (0.98, 0.985), STAGE, |&at| sized[at].2.error(frame, extended, replays))?;
-        for (at, error) in promises.into_iter().zip(shown) {
-            (sized[at].0, sized[at].1) = (error.map_or(f64::INFINITY, |error| missed(&error)), true);
-        }
-    };
-    let siblings: Vec<Trial> = near.iter().flat_map(|(_, trial)| trial.siblings()).collect();
-    let missed =
-        watch.each(&siblings, (0.985, 0.99), STAGE, |trial| Some(missed(&trial.error(frame, extended, replays)?)))?;
-    for (sibling, missed) in siblings.into_iter().zip(missed) {
-        let own = near.iter_mut().find(|(_, own)| std::ptr::eq(own.law, sibling.law));
-        if let Some((own, missed)) = own.zip(missed).filter(|(own, missed)| missed < &own.0) {
-            *own = (missed, sibling);
-        }
-    }
-    near.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let gain = |missed: f64| mean(&replays.misses(&before), GIVES) - missed;
-    // What gains little beside the best is no rival of it.
-    let most = near.first().map_or(0.0, |(missed, _)| gain(*missed));
-    Ok(near.into_iter().filter(|(missed, _)| gain(*missed) >= RIVAL * most).map(|(_, trial)| trial).collect())
 }
 
 #[cfg(test)]

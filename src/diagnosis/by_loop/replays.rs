@@ -184,6 +184,28 @@ impl<'r> Replays<'r> {
         self.blocks().into_iter().map(weight).collect()
     }
 
+    /// How much of what some blocks are missed by, beyond what the encoder itself is off by, would be gone if the loop went on the way from one
+    /// error to another for as long as is best: a share of its squares, each block by its own weight. 0 where it would have to go back.
+    #[must_use]
+    pub fn alike(&self, before: &[f64], there: &[f64], over: Over) -> f64 {
+        let (mut along, mut way, mut missed) = (0.0, 0.0, 0.0);
+        for (rows, weight) in self.weighed(before, over) {
+            let (before, there) = (&before[rows.clone()], &there[rows]);
+            let steps = || before.iter().zip(there).map(|(before, there)| (before, before - there));
+            along += weight * steps().map(|(before, step)| before * step).sum::<f64>();
+            way += weight * steps().map(|(_, step)| step * step).sum::<f64>();
+            let beyond = mean_square(before) - self.floor.powi(2);
+            missed += weight * beyond.max(0.0) * before.len() as f64;
+        }
+        if along > 0.0 && way * missed > 0.0 { (along * along / (way * missed)).min(1.0) } else { 0.0 }
+    }
+
+    /// The rows of some blocks after the beginning, with the weight by which their squares count.
+    pub fn weighed(&self, error: &[f64], over: Over) -> impl Iterator<Item = (Range<usize>, f64)> {
+        let blocks = self.blocks().into_iter().zip(self.weights(error)).enumerate();
+        blocks.filter(move |(block, _)| over.has(*block)).map(|(_, block)| block)
+    }
+
     /// Which rows of the recording lie in blocks of one half or the other.
     #[must_use]
     pub fn lies_in(&self, over: Over) -> Vec<bool> {

@@ -175,6 +175,12 @@ impl Trial {
         self.shape == other.shape
     }
 
+    /// Whether it is of the law of another trial.
+    #[must_use]
+    pub fn is_of_law(&self, other: &Self) -> bool {
+        std::ptr::eq(self.law, other.law)
+    }
+
     /// The effect that it stands for; `None` beyond physical bounds.
     #[must_use]
     pub fn effect(&self, frame: &Frame) -> Option<Effect> {
@@ -289,13 +295,12 @@ impl Trial {
         if !self.linear {
             return Some((self, there));
         }
-        let weights = replays.weights(before);
         let (mut along, mut square) = (0.0, 0.0);
-        for (block, rows) in replays.blocks().into_iter().enumerate().filter(|(block, _)| over.has(*block)) {
+        for (rows, weight) in replays.weighed(before, over) {
             for (before, there) in before[rows.clone()].iter().zip(&there[rows]) {
                 let slope = before - there;
-                along += weights[block] * before * slope;
-                square += weights[block] * slope * slope;
+                along += weight * before * slope;
+                square += weight * slope * slope;
             }
         }
         let size = if square > 0.0 { along / square } else { return None };
