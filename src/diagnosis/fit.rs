@@ -7,6 +7,7 @@
 mod beside;
 mod few;
 mod given;
+mod noise;
 mod refine;
 mod slopes;
 mod smoothed;
@@ -79,6 +80,7 @@ pub struct Fit {
     pub residual: Vec<f64>,
     basis: Vec<Vec<f64>>,
     rows: usize,
+    noise: OnceLock<[f64; 2]>,
 }
 
 impl<'f, 'a> Bench<'f, 'a> {
@@ -206,7 +208,7 @@ impl<'f, 'a> Bench<'f, 'a> {
         }
         let mut next = solution.into_iter();
         let coefficients = parts.iter().map(|p| next.by_ref().take(p.columns.len()).collect()).collect();
-        Fit { parts, coefficients, residual, basis, rows: self.rows }
+        Fit { parts, coefficients, residual, basis, rows: self.rows, noise: OnceLock::new() }
     }
 
     /// The others of a set, fitted without one of its parts; their non-linear parameters stay.

@@ -297,7 +297,7 @@ pub fn beyond_noise(axis: &Axis, frame: &Frame) -> Option<f64> {
 /// Mean square of what a fit leaves of the torque, and that of its noise.
 #[must_use]
 pub fn squares_and_noise(bench: &Bench, fit: &Fit) -> [f64; 2] {
-    [bench.certain_rms(fit)[0], bench.frame.floor(&bench.rest(fit)[0], true)].map(|rms| rms * rms)
+    [bench.certain_rms(fit)[0], bench.noise_left(fit)[0]].map(|rms| rms * rms)
 }
 
 /// Whether what is explained is mostly a curve over speed, or along the stroke, and is not that curve: too much of it is left.
@@ -408,12 +408,8 @@ impl Excess {
     /// The excess of a fit; the floor is that of the best fit. Where what is believed may be off, that much is no excess.
     #[must_use]
     pub fn of(bench: &Bench, fit: &Fit, best: &Fit) -> Excess {
-        let (rms, floor) = (bench.certain_rms(fit), bench.rest(best));
-        let channels = (0..2)
-            .filter(|&c| !floor[c].is_empty())
-            .map(|c| (rms[c] / bench.frame.floor(&floor[c], c == 0)).powi(2) - 1.0)
-            .collect();
-        Excess { channels }
+        let channels = bench.certain_rms(fit).into_iter().zip(bench.noise_left(best)).filter(|(_, noise)| *noise > 0.0);
+        Excess { channels: channels.map(|(rms, noise)| (rms / noise).powi(2) - 1.0).collect() }
     }
 
     /// What a machine leaves on a system of equations.

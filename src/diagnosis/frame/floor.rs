@@ -2,6 +2,7 @@
 
 use super::{Frame, SCALES_HOLD, norm};
 use crate::analysis::statistics::median;
+use rayon::prelude::*;
 
 impl Frame<'_> {
     /// What white noise of the torque of deviation 1 in each row is at the judged rows.
@@ -38,8 +39,8 @@ impl Frame<'_> {
         };
         // Noise of the encoder's grid alternates from row to row and looks large at the least spacing, structure at wide
         // ones: the smallest estimate is the one least spoilt.
-        let estimates = [1, 2, 3, 5, 8].into_iter().filter_map(at_spacing).filter(|e| *e > 0.0);
-        let noise = estimates.fold(f64::INFINITY, f64::min).clamp(1e-12, 1e12);
+        let estimates = [1, 2, 3, 5, 8].into_par_iter().filter_map(at_spacing).filter(|e| *e > 0.0);
+        let noise = estimates.reduce(|| f64::INFINITY, f64::min).clamp(1e-12, 1e12);
         if averaged {
             return noise.hypot(self.unseen);
         }
