@@ -7,6 +7,7 @@
 
 use super::belief;
 use super::by_loop::Replays;
+use super::causes::LAWS;
 use super::frame::{Columns, Frame};
 use super::grids;
 use super::judge::{left_by, squares_and_noise};
@@ -65,10 +66,15 @@ pub fn made_by_sensors(
     let Some(replays) = replays else { return Ok(Vec::new()) };
     let base = belief::base_alone(&without);
     let [_, noise] = left_by(&found.extended, first, squares_and_noise);
+    // A table is simulated for itself alone. A quieter look counts all that is found.
+    let tables = LAWS.iter().filter(|law| law.is_simulated() && !quieter).map(|law| law.cause);
+    let except: Vec<Cause> =
+        tables.filter(|table| !small.contains(table)).chain(recorded.except.iter().copied()).collect();
     let made_in = |motion: &[Vec<f64>; 2]| -> Result<Vec<Cause>, Stopped> {
         let columns = noisy(&without, recorded.whole.columns, motion.clone(), (first.low_pass.width, noise));
         let whole = Whole::new(&without, &columns);
-        let twin = Recorded { axis: &without, belief: &without, whole: &whole, holdout: None, ..*recorded };
+        let twin =
+            Recorded { axis: &without, belief: &without, whole: &whole, holdout: None, except: &except, ..*recorded };
         let thinned = columns.clone().thinned();
         let frame = |width| Frame::new(&base, &thinned, Some(width)).after_first_swings(&without);
         let look_at = |width| answer(&twin, &frame(width), Vec::new());
