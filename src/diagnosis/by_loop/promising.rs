@@ -13,8 +13,8 @@ const RIVAL: f64 = 0.25;
 /// Causes that are refined.
 const TRIED: usize = 4;
 /// Share of the squares of what is missed that a trial which has nothing to do with it goes along with one time in ten, by as many blocks as give
-/// a cause its numbers. Of 60 machines with a clearance, a spring or friction that builds up the best start of that goes along with 0.19
-/// at least.
+/// a cause its numbers. Of some 40 machines with a clearance, a spring or friction that builds up the best start of that goes along with
+/// 0.18 at least.
 const BY_CHANCE: f64 = 0.07;
 
 /// Of these the causes that take most off what a machine misses in the beginning of the recording, each where it takes most.
