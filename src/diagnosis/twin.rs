@@ -66,7 +66,7 @@ pub fn made_by_sensors(
     let Some(replays) = replays else { return Ok(Vec::new()) };
     let base = belief::base_alone(&without);
     let [_, noise] = left_by(&found.extended, first, squares_and_noise);
-    // A table is simulated for itself alone. A quieter look counts all that is found.
+    // A table that is not in question need not be simulated; but a quieter look counts all that is found.
     let tables = LAWS.iter().filter(|law| law.is_simulated() && !quieter).map(|law| law.cause);
     let except: Vec<Cause> =
         tables.filter(|table| !small.contains(table)).chain(recorded.except.iter().copied()).collect();

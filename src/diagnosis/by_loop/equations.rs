@@ -17,16 +17,15 @@ pub struct Equations {
 impl Equations {
     /// Of slopes and of what is left, over these blocks.
     pub fn of(replays: &Replays, slopes: &[Vec<f64>], left: &[f64], over: Over) -> Self {
-        let (count, weights) = (slopes.len(), replays.weights(left));
-        let of_block = |(block, rows): (usize, std::ops::Range<usize>)| {
+        let count = slopes.len();
+        let of_block = |(rows, weight): (std::ops::Range<usize>, f64)| {
             let product = |a: &[f64], b: &[f64]| -> f64 {
-                weights[block] * a[rows.clone()].iter().zip(&b[rows.clone()]).map(|(a, b)| a * b).sum::<f64>()
+                weight * a[rows.clone()].iter().zip(&b[rows.clone()]).map(|(a, b)| a * b).sum::<f64>()
             };
             let normal = DMatrix::from_fn(count, count, |i, j| product(&slopes[i], &slopes[j]));
             (normal, DVector::from_fn(count, |i, _| product(&slopes[i], left)))
         };
-        let blocks = replays.blocks().into_iter().enumerate().filter(|(block, _)| over.has(*block));
-        Self { blocks: blocks.map(of_block).collect() }
+        Self { blocks: replays.weighed(left, over).map(of_block).collect() }
     }
 
     /// Over all blocks.

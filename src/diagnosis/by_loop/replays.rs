@@ -177,13 +177,6 @@ impl<'r> Replays<'r> {
         format!("{typical:.3} {unit}")
     }
 
-    /// The weight by which the squares of each block count, so that all count alike.
-    #[must_use]
-    pub fn weights(&self, error: &[f64]) -> Vec<f64> {
-        let weight = |rows: Range<usize>| (mean_square(&error[rows]) + self.floor.powi(2)).recip();
-        self.blocks().into_iter().map(weight).collect()
-    }
-
     /// How much of what some blocks are missed by, beyond what the encoder itself is off by, would be gone if the loop went on the way from one
     /// error to another for as long as is best: a share of its squares, each block by its own weight. 0 where it would have to go back.
     #[must_use]
@@ -200,10 +193,13 @@ impl<'r> Replays<'r> {
         if along > 0.0 && way * missed > 0.0 { (along * along / (way * missed)).min(1.0) } else { 0.0 }
     }
 
-    /// The rows of some blocks after the beginning, with the weight by which their squares count.
+    /// The rows of some blocks after the beginning, with the weight by which their squares count, so that all blocks count alike.
     pub fn weighed(&self, error: &[f64], over: Over) -> impl Iterator<Item = (Range<usize>, f64)> {
-        let blocks = self.blocks().into_iter().zip(self.weights(error)).enumerate();
-        blocks.filter(move |(block, _)| over.has(*block)).map(|(_, block)| block)
+        let blocks = self.blocks().into_iter().enumerate().filter(move |(block, _)| over.has(*block));
+        blocks.map(|(_, rows)| {
+            let weight = (mean_square(&error[rows.clone()]) + self.floor.powi(2)).recip();
+            (rows, weight)
+        })
     }
 
     /// Which rows of the recording lie in blocks of one half or the other.
